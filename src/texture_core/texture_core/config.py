@@ -87,7 +87,7 @@ def _import(name: str, kind: str) -> Any:
         return getattr(importlib.import_module(module), attribute)
     except TextureError:
         raise
-    except Exception as error:  # whatever the user's module does when it is imported
+    except Exception as error:  # any error of the user's module at its import
         place = place_of(error, module)
         if place and module not in sys.modules:  # otherwise it was imported and lacks the attribute
             raise UnknownName(f"no {kind} '{name}': its module fails with {place}; correct it there") from error

@@ -236,7 +236,7 @@ class FeatureVector:
     `feature_set` is the fingerprint of the windows, inputs and features that made the values: a model refuses
     vectors of another fingerprint. `skipped` counts the windows left out so far for lost or non-finite samples.
     `sequence` counts the vectors that its sender has sent before: a jump is a loss.
-    `motion`, `direction_rad` and `sensor` say how the window was measured, as `speed_m_s` and `force_n` do.
+    `motion`, `direction_rad` and `sensor` describe the measurement of the window, as `speed_m_s` and `force_n` do.
     """
 
     start_ns: int

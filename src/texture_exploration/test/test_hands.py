@@ -163,7 +163,7 @@ def test_a_cable_that_is_pulled_out_stops_the_motors(bus, hand):
 def test_motors_that_were_stopped_by_their_watchdog_are_a_named_fault(bus, hand):
     hand.connect()
     bus.motors.tables[5][WATCHDOG] = TRIPPED
-    until(lambda: "motor 5 ('press' of middle) heard nothing for 0.3 s, and its watchdog stopped it" in fault_of(hand))
+    until(lambda: "motor 5 ('press' of middle) got no message for 0.3 s, and its watchdog stopped it" in fault_of(hand))
     until(lambda: torque_is_off(bus))
 
 

@@ -19,13 +19,13 @@ from texture_exploration.safety import MOST_FORCE_N, MOST_M, SafetyLimits
 # --------------------
 # Duration of a silence while the loop was running.
 
-# After a longer gap between two steps this process slept: the age of the arm's state says nothing about the arm.
+# After a longer gap between two steps this process slept: the age of the arm's state does not concern the arm.
 GAP_NS = 50_000_000
 
 
 @dataclass(frozen=True)
 class Listening:
-    """Start of the loop and its newest gap: after a pause of the machine a silence says nothing about sensor or arm.
+    """Start of the loop and its newest gap: after a pause of the machine a silence does not concern sensor or arm.
 
     Only the newest gap is left out of a silence. If every gap were, a busy machine whose steps are late again and again
     would never notice that an arm or a sensor is silent.
@@ -92,7 +92,7 @@ ZEROING_S = 0.1  # an arm may zero its force sensor at rest, or as it starts to 
 BEFORE = 1000  # states before the contact
 LOW_FRACTION = 0.25  # of them are below the force in free air: on a soft surface the force rises long before it counts
 AFTER = 5  # readings in the upper half of the lift
-MIN_RISE_M = 0.001  # a lift that was seen from less far below says nothing of free air
+MIN_RISE_M = 0.001  # a lift that was observed over a shorter distance does not show free air
 WAY_S = 0.15  # of commands that count as the way into an obstacle: no arm is later
 BACK_S = 0.3  # no way back takes longer
 HELPS_S = 0.09  # after which the force has begun to fall, if it ever will

@@ -236,7 +236,7 @@ class CalmDown(Stage):
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Wait; rise by the clearance whenever the arm has not zeroed its force sensor within `PATIENCE_S`."""
-        # A sensor that reads nothing at rest was zeroed, though the arm may not say so yet; a contact would be read
+        # A sensor that reads nothing at rest was zeroed, though the arm may not report it yet; a contact would be read
         before, self._before = self._before or arm, arm
         if (
             math.dist(before.position, arm.position) < REST_STEP_M

@@ -172,7 +172,7 @@ class Motion:
 
     @property
     def lifted(self) -> bool:
-        """Whether the finger was lifted at the end, and the measured force says so."""
+        """Whether the finger was lifted at the end, confirmed by the measured force."""
         if self._ended_ahead:
             return self._free_ahead
         return bool(self._lift.free)

@@ -20,7 +20,7 @@ TOUCHES_MISSING = "the launch files 'ur' and 'ros_controllers' offer it; start o
 
 
 def trigger(summary: str, service: str, advice: str = EXPLORER_MISSING) -> Command:
-    """Return the sub-command that calls a service; `advice` says what to do when no node offers it."""
+    """Return the sub-command that calls a service; `advice` is the remedy when no node offers it."""
 
     def run(options: argparse.Namespace) -> int:
         with Operator(options.namespace) as operator:

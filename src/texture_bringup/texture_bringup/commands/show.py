@@ -212,7 +212,7 @@ def _dds() -> str:
         from texture_bringup.operator import middleware
 
         name = middleware()
-    except Exception as error:  # whatever a broken installation raises: this command shows it
+    except Exception as error:  # this command reports any error of a broken installation
         name = f'cannot be loaded: {error}'
     domain, reach = os.environ.get('ROS_DOMAIN_ID', '0'), os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE', 'SUBNET')
     return f'{name}, domain {domain}, discovery range {reach}'

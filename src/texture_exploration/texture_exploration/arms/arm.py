@@ -132,7 +132,7 @@ class Arm:
         raise NotImplementedError
 
     def check(self) -> None:
-        """Return if the arm answers and could move, without keeping control; DeviceError says why not."""
+        """Return if the arm answers and could move, without keeping control; DeviceError with the reason if not."""
         try:
             self.connect()
             self.state()

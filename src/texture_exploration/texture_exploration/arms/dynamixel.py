@@ -328,8 +328,8 @@ class DynamixelBus:
             return ''
         if value('bus_watchdog') == TRIPPED:
             raise DeviceError(
-                f'{owner} heard nothing for {self._profile.watchdog_s:g} s, and its watchdog stopped it: the computer '
-                'or the bus was held up; all motors were released'
+                f'{owner} got no message for {self._profile.watchdog_s:g} s, and its watchdog stopped it: the '
+                'computer or the bus was delayed; all motors were released'
             )
         if not value('torque_enable') or (watchdog and value('bus_watchdog') != watchdog):
             self._reasons[motor] = f'{owner} {RESET}'

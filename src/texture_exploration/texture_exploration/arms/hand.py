@@ -262,7 +262,7 @@ def read_profile(content: Mapping[str, Any], name: str) -> Profile:
     if profile.watchdog_s != 0 and not 1 <= profile.watchdog_s / WATCHDOG_UNIT_S <= MAX_WATCHDOG:
         raise InvalidParameter(
             f'{where}: watchdog_s is {profile.watchdog_s:g} s; allowed are {WATCHDOG_UNIT_S:g} to '
-            f'{MAX_WATCHDOG * WATCHDOG_UNIT_S:g} s, and 0, with which the motors press on when nobody commands them'
+            f'{MAX_WATCHDOG * WATCHDOG_UNIT_S:g} s, and 0, with which the motors keep pressing without commands'
         )
     if len(set(profile.ids)) != len(profile.ids):
         raise InvalidParameter(f'{where}: a motor is named twice; each has one role')

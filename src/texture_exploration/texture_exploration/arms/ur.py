@@ -300,7 +300,7 @@ DASHBOARD_BANNER = 'Universal Robots Dashboard Server'
 FIRST_WITHOUT_DASHBOARD = 10  # PolyScope X
 FIRST_WITH_REMOTE_CONTROL = (5, 6)
 # Oldest software by series: the oldest CB3 that ur-rtde 1.6.5 is tested with (its README); an e-Series with remote
-# control; a PolyScope X that takes programs on the port where ur-rtde sends its own.
+# control; a PolyScope X that takes programs on the port that ur-rtde uses.
 OLDEST: Mapping[int, tuple[int, int]] = {3: (3, 12), 5: (5, 6), 10: (10, 10)}
 CB3 = 3  # the series without a force sensor in the flange
 CONTROL_SCRIPT = 'rtde_control'  # the program of ur-rtde
@@ -523,7 +523,7 @@ def _stop(ip: str, version: tuple[int, int], timeout_s: float) -> None:
         time.sleep(SAMPLE_PERIOD_S)
 
 
-BASE_FRAME_ID = 'base'  # as ur_robot_driver and UR's own description call it, without a prefix
+BASE_FRAME_ID = 'base'  # as in ur_robot_driver and the description of UR, without a prefix
 RECOVERY_S = 6.0
 POLL_S = 0.01
 

@@ -162,9 +162,7 @@ RESULT_KEPT_S = 60  # for a late client; rclpy's 15 min are hundreds of results
 class ExplorerParams:
     """The arm, and when control of it is taken."""
 
-    arm: str = param(
-        'simulated', "Arm that carries the finger: a name of the catalogue, or 'module:Class' of your own."
-    )
+    arm: str = param('simulated', "Arm that carries the finger: a name of the catalogue, or a user's 'module:Class'.")
     autostart: bool = param(
         True,
         'Configures and activates the node at start-up, which takes control of the arm; false leaves that to a '
@@ -183,7 +181,7 @@ class ExplorerParams:
 class ExplorerNode(PatientLifecycleNode):
     """Explore on request, as a service or as an action; publish the state of the finger.
 
-    Configuring checks that the arm answers, activating takes control, deactivating lifts the finger and releases the arm.
+    Configuring checks that the arm answers, activating takes control, deactivating lifts the finger and releases it.
     """
 
     def __init__(self, **kwargs: Any) -> None:
