@@ -112,7 +112,7 @@ STORED = {'speed_m_s': 0.03, 'force_n': 5.0, 'distance_m': 0.08, 'direction_rad'
     ('stored', 'options', 'made'),
     [
         (STORED, (), STORED),
-        ({}, (), USUAL),  # a reference that does not tell how it was made
+        ({}, (), USUAL),  # a reference without the numbers of its slide
         ({'force_n': 5.0}, (), {**USUAL, 'force_n': 5.0}),
         (STORED, ('--force', '4', '--direction', '180'), {**STORED, 'force_n': 4.0, 'direction_rad': math.pi}),
         (STORED, ('--force', '0', '--direction', '0'), {**STORED, 'force_n': 0.0, 'direction_rad': 0.0}),

@@ -245,7 +245,7 @@ def test_a_machine_that_slept_does_not_take_the_sensor_for_silent(table):
 
 
 # What happens in the slide, how soon it is detected (a step of the exploration, or the allowed age of the state), and
-# what is told.
+# the expected sentence.
 FORCE, FAULT = ExplorationError.FORCE_LIMIT, ExplorationError.ARM_FAULT
 HAPPENINGS = {
     'a stop': (lambda table: table.exploration.stop('enough'), 0.02, ExplorationError.STOPPED, 'enough'),
@@ -264,7 +264,7 @@ HAPPENINGS = {
 
 @pytest.mark.parametrize('name', HAPPENINGS)
 def test_whatever_ends_a_slide_ends_it_within_100_ms_and_the_next_exploration_works(name, table, record_property):
-    happens, soon_s, error, told = HAPPENINGS[name]
+    happens, soon_s, error, expected = HAPPENINGS[name]
     happened, moved = [], []
     go_on = table.pace
 
@@ -280,11 +280,11 @@ def test_whatever_ends_a_slide_ends_it_within_100_ms_and_the_next_exploration_wo
     table.when[Phase.SLIDE] = now
     outcome = table.explore()
     assert (outcome.success, outcome.error) == (False, error)
-    assert re.search(told, outcome.message)
+    assert re.search(expected, outcome.message)
     detected_ns = next(s.stamp_ns for s in table.states if s.phase in (Phase.LIFT, Phase.ABORTED))
     record_property('detected_s', (detected_ns - happened[0]) * 1e-9)
     assert (detected_ns - happened[0]) * 1e-9 <= soon_s
-    # An arm that hangs does not tell that its command has run out.
+    # An arm that hangs does not report that its command has run out.
     if name != 'an arm that hangs':
         assert all(time_ns <= detected_ns + 100_000_000 for time_ns, slides in moved if slides)
     assert table.phases[-1] is Phase.ABORTED

@@ -45,7 +45,7 @@ def request_of(timeout_s=0, **fields):
 
 
 class Client(Node):
-    """Somebody who asks, listens and, if told to, estimates."""
+    """A client that calls, subscribes and, on request, estimates."""
 
     def __init__(self):
         super().__init__('client')

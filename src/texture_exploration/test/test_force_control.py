@@ -73,8 +73,8 @@ def test_a_force_that_goes_on_to_rise_is_named():
 
 
 def test_a_harder_touch_than_the_declared_contact_allows_is_named():
-    told = 'the force rose by 0.45 N after the first touch, and 0.33 N are the most to expect'
-    assert stood(lambda s: 0.05 if s < 0.008 else 0.5).startswith(told)
+    expected = 'the force rose by 0.45 N after the first touch, and 0.33 N are the most to expect'
+    assert stood(lambda s: 0.05 if s < 0.008 else 0.5).startswith(expected)
 
 
 # Declared and true stiffness in N/m, delay in ms, noise in mN.

@@ -438,9 +438,9 @@ def test_what_makes_the_arm_unsafe_while_it_obeys_ends_the_slide_with_the_finger
 
 def test_a_process_that_was_told_to_end_waits_for_no_controller_and_commands_nothing(monkeypatch):
     robot = Robot(connect_timeout_s=30.0)
-    told = threading.Event()
-    told.set()
-    monkeypatch.setattr('texture_exploration.arms.arm.ENDING', told)
+    ending = threading.Event()
+    ending.set()
+    monkeypatch.setattr('texture_exploration.arms.arm.ENDING', ending)
     with pytest.raises(DeviceError, match='aborted, as this process was asked to end'):
         robot.driven.connect()
     assert not any(any(velocity) for _, velocity in robot.sent)
@@ -877,7 +877,7 @@ def test_controllers_that_cannot_be_switched_back_are_a_warning():
     assert robot.driven.warning() == 'the controllers were not switched back: the manager refused'
 
 
-# What is not as the arm is told, and the largest true force in any direction that follows, N.
+# Deviation from the parameters of the arm, and the largest true force in any direction that follows, N.
 WALL = {'wall_m': 0.02, 'friction': 0.3}
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=5.0, distance_m=0.06)
 TRAVEL_M = 0.06

@@ -59,7 +59,7 @@ UNLOCK_S = 0.2
 
 
 class EmulatedRig:
-    """The emulated controller, and the true state of its finger, as it tells the emulator."""
+    """The emulated controller, and the true state of its finger, as it is sent to the emulator."""
 
     def __init__(self, ip, **values):
         self._folder = tempfile.TemporaryDirectory()
@@ -169,7 +169,7 @@ def commands():
 
 @contextlib.contextmanager
 def listener(ip, port=30004, serve=None):
-    """Someone who takes connections and, unless told otherwise, never answers."""
+    """Someone who takes connections and, by default, never answers."""
     with socket.create_server((ip, port)) as server:
         if serve is not None:
             threading.Thread(target=serve, args=(server,), daemon=True).start()
@@ -429,7 +429,7 @@ def test_without_the_upper_registers_a_fieldbus_that_holds_the_lower_ones_is_an_
 # --------------------
 # What would hurt the finger or the sample, with the true force from outside.
 
-ABOVE_PLANE_M = 0.008  # so much higher than the arm was told is the surface
+ABOVE_PLANE_M = 0.008  # height of the surface above its declared place
 PRESSING = ArmCommand(force_n=3.0)
 
 
