@@ -14,24 +14,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-# Files that hold no such test are not imported by `-m realtime` and `-m benchmark`: each worker saves seconds.
+# Files without such a test are not imported by `-m realtime` and `-m benchmark`: each worker saves seconds.
 NAMED_MARKERS = ('realtime', 'benchmark')
 SYSTEM = 'texture_bringup'  # the package whose realtime tests start all nodes
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """Import only files with a test that was asked for, and doctests only of modules that need no ROS."""
+    """Import only files with a selected test, and doctests only of modules that need no ROS."""
     if collection_path.suffix != '.py' or collection_path.name == 'conftest.py':
         return None
     text = _text(collection_path)
     if collection_path.name.startswith('test_'):
-        return True if any(marker not in text for marker in asked_for(config.getoption('markexpr'))) else None
+        return True if any(marker not in text for marker in selected_markers(config.getoption('markexpr'))) else None
     needs_ros = bool({'nodes', 'ros', 'ros.py', 'ros_testing.py', 'operator.py'} & set(collection_path.parts))
     return True if config.getoption('doctestmodules') and (needs_ros or '>>> ' not in text) else None
 
 
-def asked_for(expression: str) -> list[str]:
-    """Return the markers that each test must have which an expression of `-m` selects."""
+def selected_markers(expression: str) -> list[str]:
+    """Return the markers that every test selected by an expression of `-m` must have."""
     terms = [] if re.search(r'\bor\b|[()]', expression) else expression.split(' and ')
     return [marker for marker in NAMED_MARKERS if marker in terms]
 
@@ -42,7 +42,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item], config: pytest.Confi
         for marker in NAMED_MARKERS:
             if item.get_closest_marker(marker) and marker not in _text(item.path):
                 raise pytest.UsageError(f"{item.path} does not name the marker '{marker}' of its test {item.name}")
-    if 'realtime' in asked_for(config.getoption('markexpr')):
+    if 'realtime' in selected_markers(config.getoption('markexpr')):
         order = {path: place for place, path in enumerate(spread(list(dict.fromkeys(item.path for item in items))))}
         items.sort(key=lambda item: order[item.path])
 
@@ -55,7 +55,7 @@ def spread(paths: Sequence[Path]) -> list[Path]:
     """
     system = [path for path in paths if SYSTEM in path.parts][::-1]
     others = [path for path in paths if SYSTEM not in path.parts]
-    places = {path: place / len(own) for own in (system, others) for place, path in enumerate(own)}
+    places = {path: place / len(group) for group in (system, others) for place, path in enumerate(group)}
     return sorted([*system, *others], key=places.__getitem__)
 
 
@@ -132,7 +132,7 @@ def model(examples: Any) -> Any:
 
 @pytest.fixture(scope='session')
 def graded_windows() -> Any:
-    """Return a function that gives values, grades and textures: the first feature tells the grade, the other none."""
+    """Return a function that gives values, grades and textures: only the first feature depends on the grade."""
 
     def made(n_textures: int = 15, windows: int = 20, spread: float = 0.3, seed: int = 0) -> Any:
         rng = np.random.default_rng(seed)

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.ros
 from texture_benchmarks.ros import soak as module
 from texture_benchmarks.ros.soak import ENDINGS, FAULTS, LOOKS, NONE, FaultTrial, check, figures, longest_above_s, soak
 
-CALM = FaultTrial(NONE, True, 'success', 'the motion ended as asked', took_s=5.0, back_s=1.0, peak_n=3.1)
+CALM = FaultTrial(NONE, True, 'success', 'the motion was completed', took_s=5.0, back_s=1.0, peak_n=3.1)
 FAULT = CALM._replace(fault='guard killed', ending='aborted', message='the guard has ended')
 MIB = 2**20
 

@@ -71,7 +71,7 @@ def test_a_node_that_is_not_there_is_named_and_the_explorer_is_not_activated(gra
     explorer = graph.add(ExplorerNode, **EXPLORER)
     error = bring_up(graph, nodes='classifier explorer', timeout_s=0.5)
     assert isinstance(error, DeviceError)
-    assert re.match(r"node '/classifier' is not there; .* not activated or looked for: explorer", str(error))
+    assert re.match(r"node '/classifier' was not found; .* not activated or not reached: explorer", str(error))
     assert label(explorer) == 'unconfigured'
 
 
@@ -83,7 +83,7 @@ def test_a_deactivated_explorer_lifts_lets_go_and_refuses_until_it_is_activated_
     graph.until(lambda: any(state.phase == msg.ExplorationState.PHASE_SLIDE for state in states))
     explorer.trigger_deactivate()
     assert exploration.ended.is_set()
-    assert (exploration.outcome.success, exploration.outcome.message) == (False, 'the explorer let go of the arm')
+    assert (exploration.outcome.success, exploration.outcome.message) == (False, 'the explorer released the arm')
     with pytest.raises(DeviceError, match='not connected'):
         explorer._explorer.arm.command(ArmCommand())
     recover = graph.peer.create_client(Trigger, 'explorer/recover')

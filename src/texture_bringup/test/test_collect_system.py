@@ -61,8 +61,8 @@ def operator(folder):
 
 
 def test_a_surface_is_collected_at_places_that_training_can_leave_out(operator, folder):
-    told = []
-    end, bag = collect_surface(operator, 'cork', folder / 'bags', QUICK, lambda text, slides: told.append(text))
+    texts = []
+    end, bag = collect_surface(operator, 'cork', folder / 'bags', QUICK, lambda text, slides: texts.append(text))
     assert end.error is CollectionError.NONE, end.message
     assert 'no other surface' in end.message
     dataset = SlideDataset.from_bags([bag])
@@ -72,7 +72,7 @@ def test_a_surface_is_collected_at_places_that_training_can_leave_out(operator, 
     assert all(abs(one.x_m) < 0.05 and abs(one.y_m) < 0.04 for one in touched)
 
     operator.set_parameters('emulator', {'surface': 'sandpaper_240'})
-    end, other = collect_surface(operator, 'sandpaper', folder / 'bags', QUICK, lambda text, slides: told.append(text))
+    end, other = collect_surface(operator, 'sandpaper', folder / 'bags', QUICK, lambda text, slides: texts.append(text))
     assert 'left-out places correct' in end.message, end.message
     train_from_bags('default', [bag, other], out=folder / 'two')
 
@@ -114,7 +114,7 @@ def test_a_cancelled_collection_keeps_its_slides_and_a_missing_patch_is_named(co
     answer = service.call_async(srv.Collect.Request(request=request))
     collector.until(answer.done)
     assert answer.result().result.error_code == CollectionError.INVALID_REQUEST
-    assert answer.result().result.message.startswith('no surface is taught: touch the corners')
+    assert answer.result().result.message.startswith('no surface patch is taught: touch the corners')
     operator.set_parameters('explorer', {'patch_x_high_m': 0.05})
 
 

@@ -21,7 +21,7 @@ REFUSED, ABORTED = (ExplorationError.INVALID_REQUEST, ''), (ExplorationError.FOR
 
 
 class Explorer:
-    """Ends each touch as it is told."""
+    """Ends each touch as declared."""
 
     def __init__(self, *ends):
         self._ends, self.requests = list(ends), []

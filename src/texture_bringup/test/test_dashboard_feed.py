@@ -144,5 +144,5 @@ def test_a_motion_takes_the_numbers_it_knows_and_its_defaults_lie_within_their_r
         low, high, _ = SafetyLimits().range(number)
         assert low <= DEFAULTS[motion][number] <= high
     else:
-        with pytest.raises(MotionRefused, match=f'knows no {number}'):
+        with pytest.raises(MotionRefused, match=f'does not use {number}'):
             plan(ExplorationRequest(motion, **{number: 1.0}))

@@ -198,7 +198,7 @@ def test_an_address_that_sends_wrong_tokens_waits_longer_after_each_and_one_and_
             assert (await post(client, Authorization=f'Bearer {number}'))[0] == 401
         status, text = await post(client, Authorization=f'Bearer {TOKEN}')
         assert (status, nodes.asked) == (429, [])
-        assert 'too many wrong tokens came from 127.0.0.1; the next is looked at in 2 s' in text
+        assert 'too many wrong tokens came from 127.0.0.1; the next is checked in 2 s' in text
 
     with_client(story, Access('0.0.0.0', TOKEN, ('robot',)))
 

@@ -101,7 +101,7 @@ def wait_for_page(address, launcher):
 def test_an_operator_explores_sees_the_estimate_tares_and_stops_the_next_exploration(address) -> None:
     operator = Wire(address)
     # A busy machine delays the emulated arm, and the explorer aborts: once more, as an operator would.
-    said = next((said for _ in range(3) if 'ended as asked' in (said := operator.post('explore', SHORT))), '')
+    said = next((said for _ in range(3) if 'completed' in (said := operator.post('explore', SHORT))), '')
     assert said
     operator.until(lambda frame: frame['texture']['final'] and frame['texture']['label'] in SURFACES)
     # Too few samples come while the machine is busy; the operator is told so, and presses again.

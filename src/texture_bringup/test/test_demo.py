@@ -24,7 +24,7 @@ from texture_bringup.demo import (
     ProgressLog,
     Slide,
     demonstrate,
-    explore_patiently,
+    explore_with_retries,
 )
 from texture_bringup.operator import ExplorationResult
 from texture_core.errors import ExplorationError, MotionAborted
@@ -68,16 +68,16 @@ def test_an_aborted_slide_is_made_again_and_that_is_said(aborted: int) -> None:
     results = [
         ExplorationResult(ExplorationError.ARM_FAULT, 'the arm has not answered for 135 ms', 'late', *nothing)
     ] * aborted
-    results.append(ExplorationResult(ExplorationError.NONE, 'the motion ended as asked', 'good', *nothing))
+    results.append(ExplorationResult(ExplorationError.NONE, 'the motion was completed', 'good', *nothing))
     said: list[str] = []
     made = iter(results)
     if aborted == ATTEMPTS:
         with pytest.raises(MotionAborted, match='the exploration of felt failed: the arm has not answered'):
-            explore_patiently(lambda _: next(made), ExplorationRequest('linear_slide', surface='felt'), said.append)
+            explore_with_retries(lambda _: next(made), ExplorationRequest('linear_slide', surface='felt'), said.append)
     else:
-        explored = explore_patiently(lambda _: next(made), ExplorationRequest('linear_slide'), said.append)
+        explored = explore_with_retries(lambda _: next(made), ExplorationRequest('linear_slide'), said.append)
         assert explored.exploration_id == 'good'
-        assert said == ['aborted: the arm has not answered for 135 ms; once more'] * aborted
+        assert said == ['aborted: the arm has not answered for 135 ms; trying again'] * aborted
 
 
 @pytest.mark.ros
@@ -114,7 +114,7 @@ def test_ctrl_c_ends_it_cleanly_and_leaves_no_process(tmp_path) -> None:
         _, said = demo.communicate(timeout=DEADLINE_S)
     assert demo.returncode == 130
     # A slow start has said what it waits for.
-    shown = r'((waiting; so far|fit|read bags|compute features) [^\n]*\n)*'
+    shown = r'((waiting:|waiting for|fit|read bags|compute features) [^\n]*\n)*'
     assert re.fullmatch(rf'{shown}texture: interrupted\n', said), said
     assert 'Traceback' not in said
     assert len(pids) == 7

@@ -68,7 +68,7 @@ def test_slides_in_several_directions_end_with_the_first_that_fails_and_tell_how
         def explore(self, request, _on_progress):
             asked.append(round(math.degrees(request.direction_rad)))
             if len(asked) < 3:
-                return ExplorationResult(ExplorationError.NONE, 'the motion ended as asked', 'one', *nothing)
+                return ExplorationResult(ExplorationError.NONE, 'the motion was completed', 'one', *nothing)
             if last == 'vanished':
                 raise MotionAborted('the explorer has vanished')
             return ExplorationResult(
@@ -89,7 +89,7 @@ def test_slides_in_several_directions_end_with_the_first_that_fails_and_tell_how
     [
         (True, '', 'glass, confidence 0.78 after 2.9 s'),
         (False, OUTSIDE, f'unknown (nearest: glass, confidence 0.78 after 2.9 s): {OUTSIDE}'),
-        (False, '', 'unknown (nearest: glass, confidence 0.78 after 2.9 s): it resembles none of the known textures'),
+        (False, '', 'unknown (nearest: glass, confidence 0.78 after 2.9 s): it resembles no trained texture'),
     ],
 )
 def test_an_estimate_that_is_not_known_leads_with_that_and_says_why(known, message, text):
@@ -112,7 +112,7 @@ STORED = {'speed_m_s': 0.03, 'force_n': 5.0, 'distance_m': 0.08, 'direction_rad'
     ('stored', 'options', 'made'),
     [
         (STORED, (), STORED),
-        ({}, (), USUAL),  # a reference that does not tell how it was made
+        ({}, (), USUAL),  # a reference without the numbers of its slide
         ({'force_n': 5.0}, (), {**USUAL, 'force_n': 5.0}),
         (STORED, ('--force', '4', '--direction', '180'), {**STORED, 'force_n': 4.0, 'direction_rad': math.pi}),
         (STORED, ('--force', '0', '--direction', '0'), {**STORED, 'force_n': 0.0, 'direction_rad': 0.0}),

@@ -61,7 +61,7 @@ def test_an_argument_that_names_a_pipe_is_refused_at_once_unless_it_is_a_device(
     if name == 'device':
         assert launch(elements, device=str(pipe)) == []
         return
-    with pytest.raises(InvalidLaunch, match=r"argument 'model' is '.*pipe', which is no regular file"):
+    with pytest.raises(InvalidLaunch, match=r"argument 'model' is '.*pipe', which is neither a regular file"):
         launch(elements, model=str(pipe))
 
 

@@ -110,7 +110,7 @@ def test_motions_on_an_emulated_robot_end_with_an_estimate(robot, model, tmp_pat
             # So few slides accept nothing; the estimate is there all the same.
             assert code == 3, reported + launcher.log.read_text()
             found = re.findall(
-                r'the motion ended as asked\ntexture: +(?:unknown \(nearest: )?(\w+), '
+                r'the motion was completed\ntexture: +(?:unknown \(nearest: )?(\w+), '
                 r'confidence [\d.]+ after ([\d.]+) s',
                 reported,
             )

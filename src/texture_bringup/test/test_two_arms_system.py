@@ -103,7 +103,7 @@ def test_two_arms_explore_at_once_with_their_own_estimates_and_a_finger_that_dro
         graph.until(lambda: arms.log.read_text().count(ALL_UP) == len(SURFACES))
         explored = at_once(explore)
         assert {arm: result.message for arm, result in explored.items()} == dict.fromkeys(
-            SURFACES, 'the motion ended as asked'
+            SURFACES, 'the motion was completed'
         ), arms.log.read_text()
         assert {arm: result.texture.label for arm, result in explored.items()} == SURFACES
         assert all(result.texture.final and result.texture.windows for result in explored.values())
@@ -111,7 +111,7 @@ def test_two_arms_explore_at_once_with_their_own_estimates_and_a_finger_that_dro
         explored = at_once(lose_a_finger)
         assert (explored['left'].success, explored['left'].texture.label) == (True, SURFACES['left'])
         assert not explored['right'].success
-        assert explored['right'].message.startswith("no samples have come on 'right/finger1/signal' for")
+        assert explored['right'].message.startswith("no samples on 'right/finger1/signal' for")
         reports.clear()  # what was read before the explorations: sensors waited for their devices
         graph.until(lambda: 'finger1' in reported(reports).get('/right/sensor', ''))
         graph.until(lambda: 'finger1' in reported(reports, DiagnosticStatus.WARN).get('/right/feature_extractor', ''))

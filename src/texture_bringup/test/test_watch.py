@@ -93,5 +93,5 @@ def test_the_end_of_an_exploration_is_a_code_and_json(error, rejection, name, co
     texture = TextureEstimate(0, 'a', 'cork', rejection)
     result = ExplorationResult(error, 'so it ended', name, texture, RoughnessEstimate(0, 'a'))
     assert exit_code(result) == code
-    told = json.loads(json.dumps(as_json(result), allow_nan=False))
-    assert (told['outcome'], told['texture']['label']) == (outcome, 'cork')
+    shown = json.loads(json.dumps(as_json(result), allow_nan=False))
+    assert (shown['outcome'], shown['texture']['label']) == (outcome, 'cork')

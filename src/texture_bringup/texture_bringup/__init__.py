@@ -13,8 +13,8 @@ texture dashboard
 eval "$(register-python-argcomplete texture)" # in ~/.bashrc: completes commands and options (python3-argcomplete)
 ```
 
-Directions are in degrees in commands and on the dashboard, all else in SI units. A task that takes longer than 3 s says
-how far it is.
+Directions are in degrees in commands and on the dashboard, all else in SI units. A task shows its
+progress after 3 s.
 
 Limits: `respawn` never restarts a node that moves a robot. Other packages add commands through the entry point group
 `texture.commands`.

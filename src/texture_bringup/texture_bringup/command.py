@@ -4,7 +4,7 @@
 
 A package brings its sub-commands in its folder `commands`: the shared `setup.py` declares each module as an entry point
 of the group `texture.commands`, and each `Command` of a module for which the manifest lists several. A package of
-somebody else may declare some in the same way.
+other packages may declare theirs in the same way.
 """
 
 from __future__ import annotations
@@ -73,8 +73,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def program() -> int:
-    """Run the command as a process of its own, which ends in order when it is told to stop."""
-    # Also where a shell has started the command in the background and told it to ignore Ctrl-C.
+    """Run the command as a process, which shuts down in order when it is asked to stop."""
+    # Also where a shell has started the command in the background and made it ignore Ctrl-C.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     return main()
@@ -97,16 +97,16 @@ def _dispatch(given: Sequence[str]) -> int:
 
 
 def _complete() -> None:
-    """Answer the shell that asks what may follow a word; only the sub-command that it names is imported."""
+    """Complete a word for the shell; only the sub-command that it names is imported."""
     import argcomplete  # noqa: PLC0415 - only a shell needs it
 
     parser = argparse.ArgumentParser(prog='texture')
     parsers = parser.add_subparsers()
     words = os.environ.get('COMP_LINE', '').split()
     for name, command in installed().items():
-        own = parsers.add_parser(name)
+        chosen = parsers.add_parser(name)
         if name in words[1:2]:
-            cast(Command, command.load()).configure(own)
+            cast(Command, command.load()).configure(chosen)
     argcomplete.autocomplete(parser)
 
 

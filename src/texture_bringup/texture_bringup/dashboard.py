@@ -26,7 +26,7 @@ from texture_core.config import parse_json
 from texture_core.errors import InvalidParameter, LaunchFailed, TextureError
 
 # --------------------
-# Who may use the page: requests of this page alone, and beyond loopback only with the token.
+# Access to the page: only requests of this page, and beyond loopback only with the token.
 
 TOKEN_VARIABLE = 'TEXTURE_DASHBOARD_TOKEN'
 COOKIE = 'texture_token'
@@ -36,7 +36,7 @@ FREE_GUESSES, LONGEST_WAIT_S, MAX_ADDRESSES = 5, 300.0, 1000
 
 @dataclass(frozen=True)
 class Access:
-    """What is asked of a request."""
+    """Conditions that a request must meet."""
 
     host: str
     token: str = ''
@@ -74,7 +74,7 @@ class Access:
     def is_our_host(self, host: str) -> bool:
         """Return whether a Host header names this machine: an address, or one of its names.
 
-        A page elsewhere that lets its name point here (DNS rebinding) comes with its own name.
+        A page of another host whose name resolves to this machine (DNS rebinding) comes with another name.
         """
         name = _name(f'//{host}')
         if name in ('localhost', *self.names):
@@ -108,9 +108,9 @@ def _name(url: str) -> str:
 
 
 class Guesses:
-    """Wrong tokens by the address that they came from: after a few each doubles the time until another is looked at.
+    """Wrong tokens by address: after a few, each doubles the time until the next is checked.
 
-    One and the same again counts once: it is an open page with the token of yesterday, no guess.
+    A repeated token counts once: it comes from an open page with an outdated token and is no guess.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
@@ -118,7 +118,7 @@ class Guesses:
         self._wrong: dict[str, tuple[int, float, str]] = {}  # their number, and time and text of the last
 
     def wait_s(self, address: str) -> float:
-        """Return how long no token from an address is looked at."""
+        """Return for how long no token from an address is checked."""
         count, last_s, _ = self._wrong.get(address, (0, 0.0, ''))
         if count <= FREE_GUESSES:
             return 0.0
@@ -126,7 +126,7 @@ class Guesses:
         return max(0.0, last_s + min(2.0**doublings, LONGEST_WAIT_S) - self._clock())
 
     def note(self, address: str, token: str) -> None:
-        """Count a wrong token; of too many addresses the one that is silent for longest is forgotten."""
+        """Count a wrong token; above MAX_ADDRESSES the one that is silent for longest is removed."""
         count, last_s, last = self._wrong.pop(address, (0, 0.0, ''))
         self._wrong[address] = (count, last_s, last) if token == last else (count + 1, self._clock(), token)
         if len(self._wrong) > MAX_ADDRESSES:
@@ -134,7 +134,7 @@ class Guesses:
 
 
 # --------------------
-# The recordings that the page asks for: each a process of its own, one at a time.
+# The recordings that the page starts: each in a separate process, one at a time.
 
 
 class Recorder:
@@ -148,7 +148,7 @@ class Recorder:
         self._child: ChildLauncher | None = None
 
     def begin(self, name: str) -> str:
-        """Begin a recording of this name; return what is to be said."""
+        """Begin a recording of this name; return a message."""
         if self._child is not None:
             raise InvalidParameter(f"'{self.bag}' is being recorded already; end that first")
         try:
@@ -162,7 +162,7 @@ class Recorder:
         return f"recording to '{self.bag}'"
 
     def end(self) -> str:
-        """Complete the recording, if there is one; return what is to be said."""
+        """Complete the recording, if there is one; return a message."""
         child, self._child = self._child, None
         if child is None:
             return 'nothing is being recorded'
@@ -171,7 +171,7 @@ class Recorder:
         return f"'{bag}' is complete"
 
     def watch(self) -> None:
-        """Take note of a recording that ended by itself."""
+        """Note a recording that ended on an error."""
         child = self._child
         if child is None:
             return
@@ -208,7 +208,7 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class Viewers:
-    """The newest frame for everybody who looks; who is slow misses frames and keeps nobody waiting."""
+    """The newest frame for all viewers; a slow viewer misses frames and delays no other."""
 
     def __init__(self) -> None:
         self._frame = ''
@@ -223,16 +223,16 @@ class Viewers:
         self._news = asyncio.Event()
 
     async def watch(self, request: web.Request) -> web.StreamResponse:
-        """Send frames to who asked, until that page closes."""
+        """Send frames to the page of a request until it closes."""
         if len(self.sockets) >= MAX_VIEWERS:
-            return _said(503, f'{MAX_VIEWERS} pages are open already; close one')
-        before = self._number  # old by now, as no frames are made while nobody looks
+            return _failure(503, f'{MAX_VIEWERS} pages are open already; close one')
+        before = self._number  # outdated, as no frames are made without a viewer
         socket = web.WebSocketResponse(heartbeat=HEARTBEAT_S, max_msg_size=MAX_MESSAGE_BYTES, timeout=SERVER_CLOSING_S)
         await socket.prepare(request)
         self.sockets.add(socket)
         sending = asyncio.create_task(self._send_to(socket, before))
         try:
-            async for _ in socket:  # a page says nothing; this notices when it goes
+            async for _ in socket:  # a page sends nothing; this detects when it closes
                 pass
         finally:
             self.sockets.discard(socket)
@@ -282,7 +282,7 @@ def make_app(commands: Any, access: Access, page: Path) -> web.Application:
 
 
 def _guard(access: Access) -> Any:
-    """Return what every request passes first."""
+    """Return the middleware that checks every request."""
     guesses = Guesses()
 
     @web.middleware
@@ -307,13 +307,13 @@ def _guard(access: Access) -> Any:
 def _refusal(access: Access, guesses: Guesses, request: web.Request) -> web.StreamResponse | None:
     """Return why a request is refused, or the answer that turns a token in the address into a cookie."""
     if not access.is_our_host(request.headers.get('Host', '')):
-        return _said(403, 'this page is reached by another name; use the address that the dashboard printed')
+        return _failure(403, 'this host name is not accepted; use the address that the dashboard printed')
     changes = request.method != 'GET' or request.path == '/ws'
     if changes and not access.is_our_origin(request.headers):
-        return _said(403, 'the request comes from another page; use the page of the dashboard')
+        return _failure(403, 'the request comes from another page; use the page of the dashboard')
     address = request.remote or ''
     if access.token and (wait_s := guesses.wait_s(address)):
-        return _said(429, f'too many wrong tokens came from {address}; the next is looked at in {wait_s:.0f} s')
+        return _failure(429, f'too many wrong tokens came from {address}; the next is checked in {wait_s:.0f} s')
     given = request.query.get('token', '')
     if request.path == '/' and given and access.token and access.knows(given):
         answer = web.Response(status=303, headers={'Location': '/'})
@@ -323,7 +323,7 @@ def _refusal(access: Access, guesses: Guesses, request: web.Request) -> web.Stre
     if not access.knows(carried):
         if given or carried:
             guesses.note(address, given or carried)
-        return _said(401, 'this page needs its token: open the address that the dashboard printed, with ?token=')
+        return _failure(401, 'this page needs its token: open the address that the dashboard printed, with ?token=')
     return None
 
 
@@ -331,29 +331,29 @@ def _command(command: Callable[[Mapping[str, Any]], Awaitable[Answer]]) -> Handl
     async def act(request: web.Request) -> web.StreamResponse:
         # Another page could send a form without asking; it cannot send JSON.
         if request.content_type != 'application/json':
-            return _said(415, f'the request is {request.content_type}; application/json is needed')
+            return _failure(415, f'the request is {request.content_type}; application/json is needed')
         try:
             asked = parse_json(await asyncio.wait_for(request.text(), REQUEST_S))
         except asyncio.TimeoutError:
-            return _said(408, f'the request did not come to its end within {REQUEST_S:g} s')
+            return _failure(408, f'the request was not complete within {REQUEST_S:g} s')
         except ValueError:
-            return _said(400, 'the request is not JSON')
+            return _failure(400, 'the request is not JSON')
         if not isinstance(asked, dict):
-            return _said(400, 'the request is not a JSON object')
+            return _failure(400, 'the request is not a JSON object')
         try:
             return web.json_response(await command(asked))
         except TextureError as error:
-            return _said(409, str(error))
+            return _failure(409, str(error))
 
     return act
 
 
-def _said(status: int, message: str) -> web.Response:
+def _failure(status: int, message: str) -> web.Response:
     return web.json_response({'success': False, 'message': message}, status=status)
 
 
 # --------------------
-# The web server in a thread of its own, beside whatever else the process does.
+# The web server in a separate thread of the process.
 
 SERVING_CLOSING_S = 5.0
 

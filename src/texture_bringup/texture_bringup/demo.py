@@ -31,7 +31,7 @@ from texture_simulation.offline import SlidePlan, write_simulated
 # --------------------
 # A ROS domain for the demonstration alone, so that it disturbs nothing that runs already.
 
-# Domains whose ports lie below the ephemeral ports of Linux:
+# Domains whose ports are below the ephemeral ports of Linux:
 # https://docs.ros.org/en/jazzy/Concepts/Intermediate/About-Domain-ID.html The tests of the suite have those above 60.
 DOMAINS = range(1, 61)
 # Ports of the first participant of domain d (DDSI-RTPS 2.2, 9.6.1.1): 7400 + 250·d + 10 and + 11.
@@ -39,13 +39,13 @@ FIRST_PORT, PORTS_PER_DOMAIN, FIRST_UNICAST = 7400, 250, 10
 
 
 def free_domain() -> int:
-    """Return a ROS domain that nobody uses now."""
+    """Return a ROS domain that is not in use."""
     # Programs that start at the same moment look at different domains first.
     first = os.getpid() % len(DOMAINS)
     for domain_id in (*DOMAINS[first:], *DOMAINS[:first]):
         if all(_is_free(FIRST_PORT + PORTS_PER_DOMAIN * domain_id + FIRST_UNICAST + offset) for offset in (0, 1)):
             return domain_id
-    raise LaunchFailed(f'every ROS domain from {DOMAINS[0]} to {DOMAINS[-1]} is in use; stop something first')
+    raise LaunchFailed(f'every ROS domain from {DOMAINS[0]} to {DOMAINS[-1]} is in use; stop another program first')
 
 
 def isolated(domain_id: int, environment: Mapping[str, str]) -> dict[str, str]:
@@ -68,7 +68,7 @@ def _free_port() -> int:
         with socket.socket() as probe, contextlib.suppress(OSError):
             probe.bind(('127.0.0.1', port))
             return int(probe.getsockname()[1])
-    raise LaunchFailed('no TCP port is free; stop something first')
+    raise LaunchFailed('no TCP port is free; stop another program first')
 
 
 # --------------------
@@ -93,7 +93,7 @@ class DemoPlan:
     )
     recognised: tuple[str, ...] = ('glass', 'leather', 'woven_cloth', 'ridge_2mm_deep')
     untrained: tuple[str, ...] = ('cardboard', 'ridge_3mm')
-    training_slides: int = 40  # so many that a slide may end early: 299 must be held out to show 1 % wrong decisions
+    training_slides: int = 40  # enough that a slide may end early: 299 must be held out to show 1 % wrong decisions
     speed_m_s: float = 0.05
     force_n: float = 1.0
     distance_m: float = 0.06
@@ -123,7 +123,7 @@ OUTSIDE = frozenset({Rejection.OUTSIDE_TRAINING})
 
 @dataclass(frozen=True)
 class Slide:
-    """What came of one slide: the surface, what was expected, the answer, and the estimates while it lasted."""
+    """Result of one slide: the surface, what was expected, the answer, and the estimates while it lasted."""
 
     surface: str
     title: str
@@ -141,7 +141,7 @@ class Slide:
 
     @property
     def outcome(self) -> str:
-        """What was answered, in a few words."""
+        """The result as a short text."""
         estimate, roughness = self.answer.texture, self.answer.roughness
         if not self.expected:
             return self.answer.message
@@ -159,7 +159,7 @@ class Slide:
 
 
 class ProgressLog:
-    """Tell what happens, each section with the time since the start."""
+    """Print the progress, each section with the time since the start."""
 
     def __init__(self, out: TextIO = sys.stdout) -> None:
         self._out = out
@@ -182,7 +182,7 @@ ATTEMPTS = 3  # a machine that is busy with something else delays the emulated a
 
 
 class DemoRig:
-    """Run the emulator and the real nodes in a ROS domain of their own; use it in a `with` block."""
+    """Run the emulator and the real nodes in a separate ROS domain; use it in a `with` block."""
 
     def __init__(self, folder: Path, log: Path, arguments: Mapping[str, Any]) -> None:
         domain_id = free_domain()
@@ -208,7 +208,7 @@ class DemoRig:
         self._operator.set_parameters(node, values)
 
     def explore(
-        self, request: ExplorationRequest, tell: Callable[[str], None], ends: ExplorationError = ExplorationError.NONE
+        self, request: ExplorationRequest, report: Callable[[str], None], ends: ExplorationError = ExplorationError.NONE
     ) -> tuple[ExplorationResult, list[TextureEstimate]]:
         """Put the surface of a request under the finger and slide; return the answer and the estimates on the way."""
         self.set_parameters('emulator', surface=request.surface)
@@ -218,13 +218,13 @@ class DemoRig:
             estimates.clear()
             return self._operator.explore(wanted, lambda _state, texture: estimates.append(texture))
 
-        return explore_patiently(explore, request, tell, ends), estimates
+        return explore_with_retries(explore, request, report, ends), estimates
 
 
-def explore_patiently(
+def explore_with_retries(
     explore: Callable[[ExplorationRequest], ExplorationResult],
     request: ExplorationRequest,
-    tell: Callable[[str], None],
+    report: Callable[[str], None],
     ends: ExplorationError = ExplorationError.NONE,
 ) -> ExplorationResult:
     """Return the result of an exploration; one that ends in another way is made again, twice at most."""
@@ -234,7 +234,7 @@ def explore_patiently(
             break
         if not left:
             raise MotionAborted(f'the exploration of {request.surface} failed: {explored.message}')
-        tell(f'aborted: {explored.message}; once more')
+        report(f'aborted: {explored.message}; trying again')
     return explored
 
 
@@ -309,7 +309,7 @@ def _explore(rig: DemoRig, plan: DemoPlan, progress: ProgressLog) -> list[Slide]
         made = Slide(request.surface, title, expected, *rig.explore(request, progress.line, ends))
         if expected == ACCEPTED and made.answer.texture.rejection is not Rejection.NONE:
             # By its calibration the model rejects one slide in 25 over trained surfaces.
-            progress.line(f'· {title:<28}{made.outcome}; once more')
+            progress.line(f'· {title:<28}{made.outcome}; trying again')
             made = Slide(request.surface, title, expected, *rig.explore(request, progress.line, ends))
         slides.append(made)
         progress.line(f'{"✓" if made.as_expected else "✗"} {title:<28}{made.outcome}')
@@ -345,7 +345,7 @@ def _report(slides: Sequence[Slide], out: Path, progress: ProgressLog) -> None:
     write_json({'slides': figures}, out / FIGURES)
     draw([slide for slide in slides if slide.expected], out / PICTURE)
     right = sum(slide.as_expected for slide in slides)
-    progress.section(f'Done: {right} of {len(slides)} answers as expected. Look at {out / PICTURE}')
+    progress.section(f'Done: {right} of {len(slides)} results as expected. Look at {out / PICTURE}')
     progress.line(f'training slides, models, answers and the log of the nodes are in {out}/')
 
 

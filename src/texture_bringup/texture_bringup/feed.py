@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What the nodes publish, the newest of everything in bounded memory: what the dashboard and `texture watch` show."""
+"""The newest messages of the nodes in bounded memory, as the dashboard and `texture watch` show them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from texture_core.types import (
 )
 
 # --------------------
-# One light per node: green, yellow or red; a node that has fallen silent is red, one that has ended is grey.
+# One status indicator per node: green, yellow or red; red if it is silent, grey if it has ended.
 
 SILENT_S = 5.0  # nodes report once a second
 MAX_LIGHTS = 64
@@ -35,32 +35,32 @@ COLOURS = {'OK': 'green', 'WARN': 'yellow', 'ERROR': 'red'}
 
 
 class NodeStatuses:
-    """Keep what each node said last."""
+    """Keep the last status of each node."""
 
     def __init__(self) -> None:
         # Level, message, time (of a clock that only rises, s), and whether the node has ended with that.
         self._lights: dict[str, tuple[str, str, float, bool]] = {}
 
     def update(self, name: str, level: str, message: str, time_s: float, ended: bool = False) -> None:
-        """Take note of a report; when there are too many names, the one silent for longest is forgotten."""
+        """Note a report; above MAX_LIGHTS nodes the one that is silent for longest is removed."""
         self._lights.pop(name, None)
         self._lights[name[:MAX_CHARACTERS]] = level, message[:MAX_CHARACTERS], time_s, ended
         if len(self._lights) > MAX_LIGHTS:
             del self._lights[next(iter(self._lights))]
 
     def newest(self, name: str) -> tuple[str, str] | None:
-        """Return level and message of what a node said last; None if it never did."""
+        """Return level and message of the last status of a node; None if there is none."""
         return self._lights[name][:2] if name in self._lights else None
 
     def shown(self, time_s: float) -> list[dict[str, str]]:
-        """Return name, colour and sentence of each light, by name."""
+        """Return name, colour and message of each status indicator, by name."""
         found = []
-        for name, (level, message, said_s, ended) in sorted(self._lights.items()):
+        for name, (level, message, reported_s, ended) in sorted(self._lights.items()):
             colour, text = COLOURS.get(level, 'red'), message
             if ended:
                 colour, text = ENDED_COLOURS.get(level, 'red'), f'ended: {message}'
-            elif time_s - said_s > SILENT_S:
-                colour, text = 'red', f'silent for {time_s - said_s:.0f} s; it said last: {message}'
+            elif time_s - reported_s > SILENT_S:
+                colour, text = 'red', f'silent for {time_s - reported_s:.0f} s; its last message: {message}'
             found.append({'name': name, 'colour': colour, 'message': text})
         return found
 
@@ -136,11 +136,11 @@ def spectrum_db(samples: NDArray[np.float64], bins: int) -> NDArray[np.float64]:
 
 
 # --------------------
-# The image of the slow channels: how far each is from where it rested, and where it lies.
+# The image of the slow channels: the difference of each from its level without contact, and its position.
 
 PLACE = re.compile(r'.*_(\d+)_(\d+)')  # 'taxel_6_3': row and column
 MAX_CHANNELS = 1024
-RESTING_SHARE = 0.05  # of a batch in the resting value: follows a drift of seconds, not a touch
+RESTING_WEIGHT = 0.05  # of a batch in the resting value: follows a drift of seconds, not a touch
 LEAST_NOISES = 10.0  # range of the colours in standard deviations of the noisiest channel, so that noise stays pale
 
 
@@ -168,8 +168,8 @@ class Taxels:
         if not touching:
             known = np.where(np.isfinite(self._resting), self._resting, self._newest)
             step = np.nan_to_num(self._newest - known, posinf=0.0, neginf=0.0)
-            self._resting = known + RESTING_SHARE * step
-            self._power += RESTING_SHARE * np.where(np.isfinite(self._newest), step**2 - self._power, 0.0)
+            self._resting = known + RESTING_WEIGHT * step
+            self._power += RESTING_WEIGHT * np.where(np.isfinite(self._newest), step**2 - self._power, 0.0)
 
     @property
     def image(self) -> NDArray[np.float64]:
@@ -183,7 +183,7 @@ class Taxels:
 
 
 def places_of(channels: tuple[str, ...]) -> list[tuple[int, int]]:
-    """Return row and column of each channel: as its name tells, else line by line in a square."""
+    """Return row and column of each channel: from its name, else line by line in a square."""
     named = [PLACE.fullmatch(channel) for channel in channels]
     if named and all(named):
         return [(int(match[1]), int(match[2])) for match in named if match]
@@ -192,10 +192,10 @@ def places_of(channels: tuple[str, ...]) -> list[tuple[int, int]]:
 
 
 # --------------------
-# What the page shows: the newest of everything, in bounded memory, as one JSON text a frame.
+# What the page shows: the newest messages, in bounded memory, as one JSON text per frame.
 
 FRAME_PERIOD_S = 0.1
-MAX_EXPLORATIONS = 12  # that are listed; the page itself keeps the frames that it has shown of them, for replay
+MAX_EXPLORATIONS = 12  # that are listed; the page keeps the frames that it has shown of them, for replay
 SIGNAL_S, SPECTRUM_S, LEVEL_S = 2.0, 0.5, 0.1
 POINTS, BINS = 240, 128
 MAX_LABELS = 200
@@ -204,7 +204,7 @@ IDLE = ExplorationState(0, '', '', Phase.IDLE)
 
 
 class Feed:
-    """Take what the nodes publish; give frames. Used from one thread at a time."""
+    """Collect the messages of the nodes and return frames. Used from one thread at a time."""
 
     def __init__(self) -> None:
         self._past: dict[str, dict[str, Any]] = {}  # summaries by exploration, the newest last
@@ -215,9 +215,9 @@ class Feed:
         self._texture = TextureEstimate(0, '')
         self._model = ModelInfo(0)
         self._roughness = RoughnessEstimate(0, '')
-        self.recorded = False  # what is shown comes from a bag, in which no node can report
+        self.recorded = False  # the messages come from a bag, in which no node can report
         self.recording = ''  # folder that is being recorded to
-        self.working = ''  # what a sub-command that the page has started said last
+        self.working = ''  # last message of a sub-command that the page has started
 
     @property
     def topics(self) -> Mapping[str, tuple[str, Callable[[Any], None]]]:
@@ -240,7 +240,7 @@ class Feed:
         self._taxels.update(signal, touching=self._state.phase not in ENDED)
 
     def on_state(self, state: ExplorationState) -> None:
-        """Take what the finger is doing; a new exploration begins without evidence."""
+        """Take the state of the finger; a new exploration begins without evidence."""
         if state.exploration_id and state.exploration_id not in self._past:
             self._texture = TextureEstimate(state.stamp_ns, state.exploration_id)
             self._roughness = RoughnessEstimate(state.stamp_ns, state.exploration_id)
@@ -275,7 +275,7 @@ class Feed:
             del self._past[next(iter(self._past))]
 
     def newest(self) -> tuple[ExplorationState, TextureEstimate, RoughnessEstimate]:
-        """Return what came last of the present exploration."""
+        """Return the newest state and estimates of the present exploration."""
         return self._state, self._texture, self._roughness
 
     def frame(self, time_s: float) -> dict[str, Any]:
@@ -317,7 +317,7 @@ class Feed:
         return {'values': _numbers(taxels.image), 'places': taxels.places, 'unit': taxels.unit, **least}
 
     def _missing(self, what: str, name: str) -> str:
-        """Return that there is no estimate yet and what its node says, if that node is not well."""
+        """Return that there is no estimate yet, with the status of its node if that is not OK."""
         status = self.node_statuses.newest(name)
         if self.recorded:
             return f'no {what}'

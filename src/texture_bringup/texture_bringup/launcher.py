@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Start the nodes of an XML launch file where ROS 2's own launcher is missing."""
+"""Start the nodes of an XML launch file where the launcher of ROS 2 is missing."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ from texture_core.config import PARSE_ERRORS, FileRefused, find, parse_yaml, rea
 from texture_core.errors import InvalidLaunch, LaunchFailed, TextureError
 
 # --------------------
-# A launcher as a child of another program, which watches and ends it.
+# A launcher as a child process of another program, which watches and ends it.
 
 DEATH = re.compile(r'\[launch\] .* (died with|was killed by) .*')
 STOP_DEADLINE_S = 15.0  # the launcher itself kills after 8 s
 
 
 class ChildLauncher:
-    """Run `texture launch FILE …` beside this program; use it in a `with` block."""
+    """Run `texture launch FILE …` as a child process; use it in a `with` block."""
 
     def __init__(
         self,
@@ -65,7 +65,7 @@ class ChildLauncher:
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=log,
-                start_new_session=True,  # Ctrl-C reaches this program, which then stops the nodes in its own order
+                start_new_session=True,  # Ctrl-C reaches this program only, which then stops the nodes in order
             )
         return self
 
@@ -73,9 +73,9 @@ class ChildLauncher:
         self.stop()
 
     def check(self) -> None:
-        """Raise LaunchFailed, with what the log says, if the nodes have ended."""
+        """Raise LaunchFailed, with the message of the log, if the nodes have ended."""
         if self._process is not None and self._process.poll() is not None:
-            raise LaunchFailed(f'{self._reason()}; everything the nodes said is in {self.log}')
+            raise LaunchFailed(f'{self._reason()}; the output of all nodes is in {self.log}')
 
     def stop(self) -> None:
         """Stop the nodes and wait until none is left."""
@@ -92,11 +92,11 @@ class ChildLauncher:
         """Return the sentence of the log that names what went wrong: a node that died, else the last line."""
         lines = self.log.read_text(errors='replace').splitlines()
         deaths = [line.removeprefix('[launch] ') for line in lines if DEATH.fullmatch(line)]
-        return f'node {deaths[0]}' if deaths else (lines or ['the launcher ended without a word'])[-1]
+        return f'node {deaths[0]}' if deaths else (lines or ['the launcher ended without a message'])[-1]
 
 
 # --------------------
-# What a launch file asks for, with everything substituted.
+# What a launch file describes, with all substitutions made.
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ class NodeDescription:
 
     @property
     def label(self) -> str:
-        """How the node is called in the output: its full name as far as the file gives it."""
+        """Name of the node in the output: its full name as far as the file gives it."""
         return f'{self.namespace.lstrip("/")}/{self.name or self.executable}'.lstrip('/')
 
     @property
@@ -167,7 +167,7 @@ def executable(package: str, name: str) -> Path:
 
 
 # --------------------
-# One node as a process of its own group, which ends with the launcher.
+# One node as a separate process group, which ends with the launcher.
 
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 LIBC = ctypes.CDLL(None)
@@ -178,7 +178,7 @@ def end_with(parent: int, number: signal.Signals) -> None:
     """Let the kernel send this process a signal when its parent dies, however it dies."""
     if hasattr(LIBC, 'prctl'):
         LIBC.prctl(PR_SET_PDEATHSIG, number)
-    if os.getppid() != parent:  # it died before the wish was made
+    if os.getppid() != parent:  # it died before the call above
         os._exit(1)
 
 
@@ -197,7 +197,7 @@ class RunningNode:
     ) -> None:
         self.node = node
         self.deaths = 0  # of processes of the same node before
-        self.signals = 0  # of those that ask it to end, sent so far
+        self.signals = 0  # stop signals sent so far
         self.last = ''  # line that it wrote
         self._say = say
         try:
@@ -274,7 +274,7 @@ class RunningNode:
 
 
 def ending(returncode: int) -> str:
-    """Return how a process ended, in words."""
+    """Return how a process ended, as text."""
     if returncode >= 0:
         return f'died with exit code {returncode}' if returncode else 'has finished'
     names = {number.value: number.name for number in signal.Signals}
@@ -282,19 +282,19 @@ def ending(returncode: int) -> str:
 
 
 # --------------------
-# Run the nodes of a launch file together: show what they say, restart what may be restarted, leave nothing behind.
+# Run the nodes of a launch file: show their output, restart those that may be restarted, leave no process behind.
 
-# How nodes are asked to end: so many seconds after the wish, this signal.
+# How nodes are stopped: time after the request, s, and signal.
 STOP = ((0.0, signal.SIGINT), (5.0, signal.SIGTERM), (8.0, signal.SIGKILL))
 EMULATED = 'texture_simulation'  # package of the devices that are ended last: a finger may be lifted from them
 STOPPING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 POLL_S = 0.1
 PROFILES = ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE')  # where Fast DDS looks for settings
-MISTAKE = 2  # exit code of a node that was given something it cannot use, and said so
+MISTAKE = 2  # exit code of a node that has reported an invalid input
 
 
 class Supervisor:
-    """Run nodes until all have ended or a stop is asked for."""
+    """Run nodes until all have ended or a stop is requested."""
 
     def __init__(self, nodes: Sequence[NodeDescription], say: Callable[[str], None], *, together: bool = False) -> None:
         self._nodes = nodes
@@ -306,10 +306,10 @@ class Supervisor:
         self._selector = selectors.DefaultSelector()
         self._stopping_since_s: float | None = None
         self._failed = False
-        self._cause = ''  # why the launch ends by itself
+        self._cause = ''  # why the launch ends without a request
 
     def run(self) -> int:
-        """Run the nodes to their end; return 0 if none died by itself, else 1.
+        """Run the nodes to their end; return 0 if none died, else 1.
 
         SIGINT, SIGTERM and SIGHUP stop them; further ones change nothing, as an explorer needs its time to lift the
         finger. A node that had to be killed counts as one that died.
@@ -328,7 +328,7 @@ class Supervisor:
                 self._selector.close()
                 for number, handler in handlers.items():
                     signal.signal(number, handler)
-        if self._cause:  # again: nodes that are being stopped have said much since
+        if self._cause:  # repeated, as nodes that are being stopped write many lines
             self._say(f'[launch] the launch ended because {self._cause}')
         return int(self._failed)
 
@@ -368,16 +368,16 @@ class Supervisor:
         due = sum(at_s <= since_s for at_s, _ in STOP)
         number = STOP[due - 1][1]
         users = [one for one in self._running if one.node.package != EMULATED]
-        told = [one for one in (users if users and due == 1 else self._running) if one.signals < due]
-        if not told:
+        targets = [one for one in (users if users and due == 1 else self._running) if one.signals < due]
+        if not targets:
             return
-        self._say(f'[launch] {number.name} to {", ".join(one.node.label for one in told)}')
-        for process in told:
+        self._say(f'[launch] {number.name} to {", ".join(one.node.label for one in targets)}')
+        for process in targets:
             process.signals = due
             process.send(number)
         if number is signal.SIGKILL:
             self._failed = True
-            self._say('[launch] nodes were killed that did not end; see whether the finger still presses')
+            self._say('[launch] nodes that did not end were killed; check whether the finger still presses')
 
     def _end(self, process: RunningNode, code: int) -> None:
         self._forget(process)
@@ -392,7 +392,7 @@ class Supervisor:
         if restart:
             self._due.append((time.monotonic() + node.respawn_delay_s, node, process.deaths + 1))
         elif needed and not stopping:
-            self._say(f'[launch] {node.label} is needed by the others, which are stopped now')
+            self._say(f'[launch] {node.label} is required by the other nodes, which are stopped now')
             self._cause = f'{node.label} {ending(code)}{f": {process.last}" * bool(code and process.last)}'
             self.stop()
 
@@ -406,7 +406,7 @@ class Supervisor:
 # --------------------
 # Texts with substitutions such as `$(var speed)`, as ROS 2 launch files write them.
 
-# An innermost call: its name, and its arguments one space apart; one with spaces is quoted.
+# An innermost call: its name, and its arguments separated by one space; one with spaces is quoted.
 CALL = re.compile(r"""\$\(([A-Za-z][\w-]*)((?: (?:"[^"$()]*"|'[^'$()]*'|[^\s"'$()]+))*)\)""")
 PERFORMED = re.compile(r'\0(\d+)\0')
 Perform = Callable[[str, Sequence[str]], str]
@@ -414,7 +414,7 @@ Perform = Callable[[str, Sequence[str]], str]
 
 def expand(text: str, perform: Perform) -> str:
     """Return a text with its calls performed: `perform(name, arguments)` gives the text of each, innermost first."""
-    done: list[str] = []  # what calls have given; marks stand for it, as nothing in it is a call or a quote
+    done: list[str] = []  # results of calls; marks replace them, as nothing in them is a call or a quote
 
     def resolved(part: str) -> str:
         return PERFORMED.sub(lambda mark: done[int(mark[1])], part)
@@ -453,7 +453,7 @@ class Scope:
         return expand(text, self.perform)
 
     def perform(self, name: str, arguments: Sequence[str]) -> str:
-        """Return what one substitution stands for; UnknownName or InvalidLaunch if it stands for nothing."""
+        """Return the value of one substitution; UnknownName or InvalidLaunch if it has none."""
         substitution, fewest, most = find(SUBSTITUTIONS, name, 'substitution')
         if not fewest <= len(arguments) <= most:
             raise InvalidLaunch(
@@ -517,10 +517,10 @@ def parameter_value(text: str, type_name: str) -> Any:
 
 
 # --------------------
-# Read an XML launch file: from its elements, in order, to the nodes it asks for.
+# Read an XML launch file: from its elements, in order, to its nodes.
 #
-# The elements and their attributes are a subset of upstream's (`ros2 launch`), with the same meaning: a `group` is a
-# scope of its own, an `include` is not, so the arguments given to it stay set behind it.
+# The elements and their attributes are a subset of upstream's (`ros2 launch`), with the same meaning: a `group` has a
+# separate scope, an `include` has none, so the arguments given to it stay set behind it.
 
 MAX_BYTES = 200_000  # of one file; the longest in use has 5 kB
 MAX_INCLUDES = 20  # of files within each other
@@ -546,7 +546,7 @@ ALLOWED: Mapping[str, tuple[Sequence[str], Sequence[str] | None]] = {
     'push_ros_namespace': (('namespace', *CONDITIONS), ()),
     'group': (CONDITIONS, None),
     'include': (('file', *CONDITIONS), ('arg',)),
-    'node': ((*NODE_TEXTS, 'output', *CONDITIONS), ('param', 'remap')),  # whatever a node says is shown
+    'node': ((*NODE_TEXTS, 'output', *CONDITIONS), ('param', 'remap')),  # all output of a node is shown
     'param': (('name', 'value', 'type', 'from'), ()),
     'remap': (('from', 'to'), ()),
 }
@@ -577,18 +577,18 @@ def given_arguments(texts: Iterable[str]) -> dict[str, str]:
 
 
 def _refuse_special(given: Mapping[str, str]) -> None:
-    """Refuse an argument that names what nodes would wait for or read without end; a device may be given as one."""
+    """Refuse an argument that names a special file, which nodes would read without end, unless it is a device."""
     for name, value in given.items():
         path = Path(value).expanduser()
         if 'device' in name or not path.exists() or path.is_file() or path.is_dir():
             continue
         raise InvalidLaunch(
-            f"argument '{name}' is '{value}', which is no regular file and no folder; give the path of one"
+            f"argument '{name}' is '{value}', which is neither a regular file nor a folder; give the path of one"
         )
 
 
 def read(path: Path, given: Mapping[str, str], environment: Mapping[str, str]) -> list[NodeDescription]:
-    """Return the nodes that a launch file asks for, in its order."""
+    """Return the nodes of a launch file, in its order."""
     _refuse_special(given)
     reader = _Reader()
     reader.read_file(path, Scope(dict(given), dict(environment)))
@@ -703,7 +703,7 @@ class _Reader:
         }
 
     def read_file(self, path: Path, scope: Scope) -> None:
-        """Read a file; what it asks for joins what others have."""
+        """Read a file; its nodes join those of other files."""
         root = _root(path)
         if self._depth > MAX_INCLUDES:
             raise InvalidLaunch(f"'{path}' is included more than {MAX_INCLUDES} levels deep; does it include itself?")
@@ -802,7 +802,7 @@ def _parameter(element: Element, scope: Scope) -> Path | dict[str, Any]:
             raise InvalidLaunch(f"<param name='{name}'>: {error}") from error
     path = Path(scope.expand(element.attrib['from']))
     if 'name' in element.attrib:
-        raise InvalidLaunch(f"<param from='{path}'> has a name, too; the file holds the names")
+        raise InvalidLaunch(f"<param from='{path}'> also has a name; the file holds the names")
     if not path.is_file():
         if path.parts[-4:-1] == ('texture_bringup', 'config', 'robots'):
             raise unknown_name(path.stem, [item.stem for item in path.parent.glob('*.yaml')], 'preset')

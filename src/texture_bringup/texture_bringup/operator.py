@@ -59,13 +59,13 @@ def middleware() -> str:
 
 
 # --------------------
-# Wait in a coroutine for what ROS answers in its own thread.
+# Wait in a coroutine for an answer of ROS, which comes in another thread.
 
 FOUND_DEADLINE_S, FOUND_STEP_S = 5.0, 0.05
 
 
 async def ready(is_ready: Callable[[], bool], node: str) -> None:
-    """Wait until a node can be asked: one that has just started is found a moment later."""
+    """Wait until a node can be called: one that has just started is discovered a moment later."""
     deadline_s = time.monotonic() + FOUND_DEADLINE_S
     while not is_ready():
         if time.monotonic() > deadline_s:
@@ -110,11 +110,11 @@ def parameter_from_text(name: str, text: str, kind: int) -> Parameter:
 
 
 # --------------------
-# The messages of the nodes in a namespace, to what shows them.
+# Messages of the nodes in a namespace, for display.
 
 
 def subscribe(node: Node, feed: Feed, on_bad: Callable[[InvalidData], None]) -> None:
-    """Let a feed take what is published from now on; `on_bad` is called with what contradicts itself."""
+    """Pass all messages from now on to a feed; `on_bad` is called with the error of an inconsistent message."""
 
     def taking(take: Callable[[Any], None]) -> Callable[[Any], None]:
         def on_message(message: Any) -> None:
@@ -146,23 +146,23 @@ LEVEL_NAMES = {value: name for name, value in LEVELS.items()}
 CANCEL_DEADLINE_S = 10.0
 LISTENERS_DEADLINE_S = 60.0
 FEATURES_DEADLINE_S = 30.0
-# An explorer that explores sends feedback, and else its idle state once a second: silent for so long, it has ended or
-# hangs. Whether ROS still lists a killed one says nothing for 20 s.
+# An explorer that explores sends feedback, and else its idle state once a second: silent for this long, it has ended or
+# hangs. ROS lists a killed one for another 20 s.
 GONE_S = 4.0
-LISTEN_S = 0.5  # without feedback, until its state is listened to
-# So long until a goal is taken: that takes no time, unless the request has been lost with an explorer that just died.
+LISTEN_S = 0.5  # without feedback, until its state is subscribed to
+# Time until a goal is accepted: it is short, unless the request has been lost with an explorer that just died.
 ACCEPT_S = 15.0
-# So long a service is looked for, and so long its answer may take: an arm needs seconds to recover, a tare up to 65 s.
+# Time to find a service, and time for its answer: an arm needs seconds to recover, a tare up to 65 s.
 OFFERED_S, ANSWER_S = 10.0, 75.0
 RETRY_PERIOD_S = 5.0
-# What this process sees, the other processes see soon after.
+# What this process has discovered, the others discover soon after.
 DISCOVERY_S = 1.0
 # The transition that brings a lifecycle node one step nearer to being active, or to being inactive, by its state.
 STEPS: Mapping[bool, Mapping[str, int]] = {
     True: {'unconfigured': Transition.TRANSITION_CONFIGURE, 'inactive': Transition.TRANSITION_ACTIVATE},
     False: {'active': Transition.TRANSITION_DEACTIVATE},
 }
-RESTARTED = 'the explorer was started again and knows of no such exploration; it was broken off'
+RESTARTED = 'the explorer was restarted and does not know this exploration, which was aborted'
 VANISHED = (
     'the explorer has vanished; if it was exploring, the finger may still touch the surface: look at the robot, and at '
     'the output of the explorer'
@@ -183,7 +183,7 @@ class ExplorationResult:
 
     @property
     def success(self) -> bool:
-        """Whether the motion ended as requested."""
+        """Whether the motion was completed."""
         return self.error is ExplorationError.NONE
 
 
@@ -200,10 +200,10 @@ class Operator:
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._explore = ActionClient(self._node, action.Explore, 'explore')
-        self._settings: dict[str, AsyncParameterClient] = {}  # of each node, made once: every other node remembers it
+        self._settings: dict[str, AsyncParameterClient] = {}  # of each node, made once: all nodes remember it
         self._heard_s = 0.0  # of the explorer
-        self._states: Any = None  # nobody listens yet
-        self._vectors: list[FeatureVector] | None = None  # nobody listens yet
+        self._states: Any = None  # not subscribed yet
+        self._vectors: list[FeatureVector] | None = None  # not subscribed yet
 
     def __enter__(self) -> Operator:
         return self
@@ -217,14 +217,15 @@ class Operator:
         self._context.try_shutdown()
 
     def wait_for_explorer(self, deadline_s: float, quiet_s: float | None = None) -> None:
-        """Wait until explorations can be asked for; the wait is shown after `quiet_s`."""
-        missing = 'no explorer answers; start one, such as the emulator with `texture launch emulator`'
-        self._until(self._explore.server_is_ready, deadline_s, missing, quiet_s=quiet_s)
+        """Wait until explorations can be requested; the wait is shown after `quiet_s`."""
+        advice = 'start one, such as the emulator with `texture launch emulator`'
+        with task(f'waiting for an explorer; {advice}', quiet_s=quiet_s):
+            self._until(self._explore.server_is_ready, deadline_s, f'no explorer answers; {advice}')
 
     def wait_for_node(self, name: str, deadline_s: float) -> None:
         """Wait until a node of the namespace is there."""
         namespace = self._node.get_namespace()
-        missing = f"node '{namespace.rstrip('/')}/{name}' is not there; look at its output"
+        missing = f"node '{namespace.rstrip('/')}/{name}' was not found; look at its output"
         self._until(lambda: (name, namespace) in self._node.get_node_names_and_namespaces(), deadline_s, missing)
 
     def wait_for_signal(self, deadline_s: float) -> None:
@@ -237,13 +238,13 @@ class Operator:
             self._node.destroy_subscription(subscription)
 
     def wait_for_listeners(self, topics: Sequence[str], number: int, guard: Callable[[], None]) -> None:
-        """Wait until topics have so many subscriptions, which had time to be found; `guard` is called meanwhile."""
+        """Wait until topics have `number` subscriptions and these are discovered; `guard` is called meanwhile."""
 
         def all_listen() -> bool:
             guard()
             return all(self.listeners(topic) >= number for topic in topics)
 
-        self._until(all_listen, LISTENERS_DEADLINE_S, f'nobody listens to {", ".join(topics)}')
+        self._until(all_listen, LISTENERS_DEADLINE_S, f'no node subscribes to {", ".join(topics)}')
         self._settle()
 
     def listeners(self, topic: str) -> int:
@@ -260,7 +261,7 @@ class Operator:
             on_progress(from_msg(message.feedback.state), from_msg(message.feedback.texture))
 
         accepted = self._explore.send_goal_async(action.Explore.Goal(request=to_msg(request)), on_feedback)
-        silent = 'the explorer takes no request; stop it, and see that it is alone'
+        silent = 'the explorer accepts no request; stop it, and check that no second one runs'
         self._until(accepted.done, ACCEPT_S, silent, MotionAborted)
         goal = accepted.result()
         endings = [goal.get_result_async()]
@@ -274,7 +275,7 @@ class Operator:
                     self._listen_to_states()
                 if silent_s > GONE_S:
                     raise MotionAborted(VANISHED)
-                if now_s - asked_s > RETRY_PERIOD_S:  # one that was started again says that it knows of nothing
+                if now_s - asked_s > RETRY_PERIOD_S:  # a restarted explorer answers that the goal is unknown
                     endings.append(goal.get_result_async())
                     asked_s = now_s
         except KeyboardInterrupt:
@@ -300,7 +301,7 @@ class Operator:
     def explore_with_features(
         self, request: ExplorationRequest, on_progress: Progress = lambda _state, _texture: None
     ) -> tuple[ExplorationResult, list[FeatureVector]]:
-        """Explore as `explore` does, and return the features of the windows, too; none of an aborted exploration."""
+        """Explore as `explore` does, and also return the features of the windows; none of an aborted exploration."""
         vectors = self._listen_to_features()
         vectors.clear()
         explored = self.explore(request, on_progress)
@@ -314,11 +315,11 @@ class Operator:
         return explored, [one for one in vectors if one.exploration_id == explored.exploration_id and not one.last]
 
     def stop(self) -> str:
-        """Stop whatever moves; return what the explorer says."""
+        """Stop any motion; return the message of the explorer."""
         return self.call('explorer/stop', 'start an explorer')[1]
 
     def call(self, service: str, advice: str) -> tuple[bool, str]:
-        """Call a `Trigger`; return whether it succeeded, and its sentence; `advice` is for one that no node offers."""
+        """Call a `Trigger`; return whether it succeeded, and its message; `advice` is for a missing service."""
         name = f"the service '{self._node.resolve_service_name(service)}'"
         missing = f'no node offers {name}; {advice}'
         silent = f'{name} does not answer; look at the robot, and at the output of its node'
@@ -339,7 +340,7 @@ class Operator:
             request = ChangeState.Request(transition=Transition(id=STEPS[active][label]))
             answer = self._ask(ChangeState, f'{node}/change_state', request, (OFFERED_S, missing), (ANSWER_S, silent))
             if not answer.success:
-                raise LaunchFailed(f"node '{node}' is {label} and refuses to change; its output says why")
+                raise LaunchFailed(f"node '{node}' is {label} and refuses to change; its output gives the reason")
         return label
 
     def add(self, label: str, exploration_id: str = '', deadline_s: float = 30.0) -> tuple[int, str]:
@@ -368,7 +369,7 @@ class Operator:
             show()
 
     def _listen_to_features(self) -> list[FeatureVector]:
-        """Return the list to which feature vectors are added as they come, once they would come."""
+        """Return the list to which feature vectors are added as they arrive, once their topic has a publisher."""
         if self._vectors is not None:
             return self._vectors
         vectors: list[FeatureVector] = []
@@ -377,12 +378,12 @@ class Operator:
             msg.FeatureVector, 'features', lambda message: vectors.append(from_msg(message)), FEATURE_QOS
         )
         self._until(lambda: self._node.count_publishers('features') > 0, FEATURES_DEADLINE_S,
-                    'nobody describes what is measured; is the feature_extractor running?')  # fmt: skip
+                    "no node publishes on 'features'; is the feature_extractor running?")  # fmt: skip
         self._settle()
         return vectors
 
     def _settle(self) -> None:
-        """Wait until what this process sees is seen by the others."""
+        """Wait until other processes have discovered what this process has."""
         settled_s = time.monotonic() + DISCOVERY_S
         self._until(lambda: time.monotonic() > settled_s, 2 * DISCOVERY_S, '')
 
@@ -395,7 +396,7 @@ class Operator:
         return answer
 
     def _ask(self, kind: Any, name: str, request: Any, offered: tuple[float, str], answered: tuple[float, str]) -> Any:
-        """Return the answer of a service; each step has the longest time, s, and what to say when it is over."""
+        """Return the answer of a service; each step has a timeout, s, and a message for it."""
         client = self._node.create_client(kind, name)
         try:
             self._until(client.service_is_ready, *offered)
@@ -462,10 +463,9 @@ class Operator:
         deadline_s: float,
         complaint: str,
         error: type[TextureError] = LaunchFailed,
-        quiet_s: float | None = None,
     ) -> None:
         deadline = time.monotonic() + deadline_s
-        with task(f'waiting; so far {complaint}', quiet_s=quiet_s):
+        with task(f'waiting: {complaint}'):
             while not condition():
                 if time.monotonic() > deadline:
                     raise error(f'{complaint} (waited {deadline_s:.0f} s)')
@@ -476,7 +476,7 @@ class Operator:
         self._executor.spin_once(timeout_sec=STEP_S)
 
     def _cancel(self, goal: Any, ending: Future) -> str:
-        """Ask for the end, wait until the finger is lifted, and return in a sentence how it ended."""
+        """Cancel, wait until the finger is lifted, and return in a sentence how it ended."""
         goal.cancel_goal_async()
         deadline = time.monotonic() + CANCEL_DEADLINE_S
         while not ending.done() and time.monotonic() < deadline:
@@ -484,6 +484,6 @@ class Operator:
         if not ending.done():
             return (
                 f'the explorer has not confirmed within {CANCEL_DEADLINE_S:g} s that the finger was lifted; look at '
-                'the robot, and use its own stop if it moves'
+                'the robot, and use its emergency stop if it moves'
             )
         return f'the exploration has ended: {ending.result().result.result.message}'

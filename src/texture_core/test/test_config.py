@@ -75,7 +75,7 @@ def test_an_error_in_a_users_module_is_told_with_its_file_and_line(
     file = tmp_path / 'users_module_with_a_fault.py'
     file.write_text(f'first = 1\n{line}\n')
     monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(UnknownName, match=re.escape(f'fails with {error} ({file}:2); mend it there')):
+    with pytest.raises(UnknownName, match=re.escape(f'fails with {error} ({file}:2); correct it there')):
         find({}, 'users_module_with_a_fault:Thing', 'feature')
 
 
@@ -91,7 +91,7 @@ def test_an_empty_choice_is_not_listed() -> None:
 
 @pytest.mark.parametrize('name', ['antigravity:fly', 'unittest.__main__:main', 'numpy.__main__:x'])
 def test_programs_and_parts_of_python_are_not_imported_for_a_name(name: str) -> None:
-    with pytest.raises(UnknownName, match='part or a program of Python'):
+    with pytest.raises(UnknownName, match='is a module of Python itself'):
         find({}, name, 'feature')
     assert name.partition(':')[0] not in sys.modules
 

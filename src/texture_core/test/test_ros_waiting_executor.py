@@ -25,18 +25,18 @@ DEADLINE_S = 20.0
 
 
 class Patient(Node):
-    """Answers only when it is told to, and hears what others say."""
+    """Answers only when it is released, and receives the messages of others."""
 
     def __init__(self):
         super().__init__('patient')
-        self.told, self.heard = threading.Event(), 0
+        self.released, self.heard = threading.Event(), 0
         self.create_service(Trigger, 'wait', self._wait, callback_group=ReentrantCallbackGroup())
         self.create_subscription(Empty, 'word', self._hear, 10)
         self.words = self.create_publisher(Empty, 'word', 10)
         self.asking = self.create_client(Trigger, 'wait')
 
     def _wait(self, _request, response):
-        self.told.wait(DEADLINE_S)
+        self.released.wait(DEADLINE_S)
         response.success = True
         return response
 
@@ -53,7 +53,7 @@ def world():
         executor.add_node(node)
         assert node.asking.wait_for_service(DEADLINE_S)
         yield node, executor
-        node.told.set()
+        node.released.set()
         executor.shutdown(DEADLINE_S)
         node.destroy_node()
         rclpy.try_shutdown()
@@ -70,7 +70,7 @@ def test_the_result_of_an_action_that_ends_at_the_shutdown_is_sent(world):
     node, executor = world
 
     def slide(goal):
-        node.told.wait(DEADLINE_S)
+        node.released.wait(DEADLINE_S)
         goal.abort()
         return Explore.Result(result=ExplorationResult(message='the finger was lifted'))
 
@@ -87,7 +87,7 @@ def test_the_result_of_an_action_that_ends_at_the_shutdown_is_sent(world):
     both_until(accepted.done)
     result = accepted.result().get_result_async()
     both_until(lambda: any(future._callbacks for future in server._result_futures.values()))
-    node.told.set()
+    node.released.set()
     executor.shutdown(DEADLINE_S)
     spin_until(reader, result.done)
     assert result.result().result.result.message == 'the finger was lifted'
@@ -104,7 +104,7 @@ def test_others_are_heard_while_many_wait(world):
         node.words.publish(Empty())
         spin_until(executor, lambda number=number: node.heard == number)
     assert not any(answer.done() for answer in answers)
-    node.told.set()
+    node.released.set()
     spin_until(executor, lambda: all(answer.done() for answer in answers))
     assert all(answer.result().success for answer in answers)
 
@@ -122,7 +122,7 @@ def test_each_callback_runs_once_and_waiting_costs_nothing(world):
 
     spin_until(executor, enough)
     assert len(passes) < 400  # a timer and a message each, and a few waits
-    node.told.set()
+    node.released.set()
     spin_until(executor, answer.done)
 
 

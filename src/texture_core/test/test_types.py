@@ -208,7 +208,7 @@ def test_one_emulator_has_a_pipe_and_no_other_file_stands_at_its_place(tmp_path:
     with pytest.raises(DeviceError, match=r'cannot be made: .* no other file'):
         FingerReceiver(str(tmp_path / 'file'))
     emulator = FingerReceiver(str(tmp_path / 'finger'))
-    with pytest.raises(DeviceError, match=r'another emulator has the pipe .* namespace'):
+    with pytest.raises(DeviceError, match=r'another emulator uses the pipe .* namespace'):
         FingerReceiver(str(tmp_path / 'finger'))
     emulator.close()
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What every sub-command of `texture` shares: exit codes, sentences for errors, common options."""
+"""Common parts of the sub-commands of `texture`: exit codes, error messages, options."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ T = TypeVar('T')
 
 @dataclass(frozen=True)
 class Command:
-    """A sub-command of `texture` that shares its module with others; package.xml lists it by its name there."""
+    """A sub-command of `texture` in a module with several; package.xml lists it by its name there."""
 
     summary: str
     configure: Callable[[argparse.ArgumentParser], None]
@@ -32,7 +32,7 @@ class Command:
 
 
 # --------------------
-# Options that several sub-commands share.
+# Options of several sub-commands.
 
 
 def add_namespace(parser: argparse.ArgumentParser) -> None:
@@ -57,7 +57,7 @@ def add_dask(parser: argparse.ArgumentParser) -> None:
 
 def add_seed(parser: argparse.ArgumentParser) -> None:
     """Add `--seed`."""
-    parser.add_argument('--seed', type=int, default=0, help='seed of whatever is random')
+    parser.add_argument('--seed', type=int, default=0, help='random seed')
 
 
 def core_count(text: str) -> int:
@@ -82,20 +82,20 @@ def add_parameters(parser: argparse.ArgumentParser, cls: type, without: Sequence
 
 
 def parameters_from(options: argparse.Namespace, cls: type[T], more: Mapping[str, object] = MappingProxyType({})) -> T:
-    """Return the dataclass that the options of `add_parameters` and `more` stand for, within its ranges."""
+    """Return the dataclass with the values of the options of `add_parameters` and of `more`, within its ranges."""
     named = {one.name: getattr(options, one.name) for one in parameters_of(cls) if hasattr(options, one.name)}
     return from_mapping(cls, {**named, **more})
 
 
 # --------------------
-# How far a long task is. Libraries report it anywhere; it is shown where a program has asked for it.
+# Progress of a long task. Libraries report it; a program shows it after `show_progress()`.
 
-QUIET_S = 3.0  # what is over sooner says nothing
+QUIET_S = 3.0  # a shorter task shows no progress
 TERMINAL_PERIOD_S, LOG_PERIOD_S = 0.5, 10.0
 
 
 class _Shown:
-    """Whether progress is shown, and whether a task that shows its own is going on."""
+    """Whether progress is shown, and whether an outer task shows it at present."""
 
     wanted = False
     busy = False
@@ -108,7 +108,7 @@ def show_progress() -> None:
 
 @contextmanager
 def task(what: str, total: int = 0, quiet_s: float | None = None) -> Iterator[Callable[[], None]]:
-    """Say, while a `with` block takes longer than `quiet_s` (3 s), what it does, how far it is and how long it took.
+    """Show name, progress and duration of a `with` block that takes longer than `quiet_s` (3 s).
 
     On a terminal one line changes in place and goes at the end; elsewhere a line is written every 10 s. Of nested tasks
     the outermost is shown.
@@ -125,7 +125,7 @@ def task(what: str, total: int = 0, quiet_s: float | None = None) -> Iterator[Ca
         nonlocal done
         done += 1
 
-    def tell() -> None:
+    def report() -> None:
         waited_s = quiet_s
         while not over.wait(waited_s):
             waited_s = TERMINAL_PERIOD_S if terminal else LOG_PERIOD_S
@@ -137,13 +137,13 @@ def task(what: str, total: int = 0, quiet_s: float | None = None) -> Iterator[Ca
             else:
                 print(f'{what}{since}', file=sys.stderr, flush=True)
 
-    teller = threading.Thread(target=tell, name='progress', daemon=True)
-    teller.start()
+    reporter = threading.Thread(target=report, name='progress', daemon=True)
+    reporter.start()
     try:
         yield step
     finally:
         over.set()
-        teller.join()
+        reporter.join()
         _Shown.busy = False
         if terminal and time.monotonic() - began_s > quiet_s:
             print('\r\x1b[2K', end='', file=sys.stderr, flush=True)
@@ -158,20 +158,20 @@ def progress(items: Iterable[T], what: str, total: int = 0) -> Iterator[T]:
 
 
 # --------------------
-# How a program of the suite ends: exit codes, and one sentence for an error of the user.
+# End of a program of the suite: exit codes, and one sentence for an error of the user.
 
 USER_ERROR, INTERRUPTED, CUT_OFF = 2, 130, 141
 
 
 def run_program(action: Callable[[], int], name: str = 'texture') -> int:
-    """Do what a program is for, and return its exit code."""
+    """Run the action of a program, and return its exit code."""
     try:
         try:
             return action()
         finally:
             sys.stdout.flush()
     except BrokenPipeError:
-        # What is left to print goes nowhere, or Python would complain at its end.
+        # The remaining output is discarded; otherwise Python reports an error at its end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return CUT_OFF
     except TextureError as error:

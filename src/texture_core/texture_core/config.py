@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from texture_core.types import AnyArray
 
 # --------------------
-# Look a choice up by name: in a table of the suite, or as 'module:Class' of the user's own.
+# Look a choice up by name: in a table of the suite, or as 'module:Class' of the user.
 
 T = TypeVar('T')
 
@@ -80,17 +80,17 @@ def unknown_name(name: str, known: Iterable[str], kind: str) -> UnknownName:
 def _import(name: str, kind: str) -> Any:
     module, _, attribute = name.partition(':')
     parts = module.split('.')
-    # Names come from files and over the network, too: modules that do something when imported are none of ours.
+    # Names also come from files and over the network: refuse modules of Python that act when imported.
     if parts[0] in sys.stdlib_module_names or '__main__' in parts:
-        raise UnknownName(f"no {kind} '{name}': '{module}' is a part or a program of Python; name a module of your own")
+        raise UnknownName(f"no {kind} '{name}': '{module}' is a module of Python itself; name a module that you wrote")
     try:
         return getattr(importlib.import_module(module), attribute)
     except TextureError:
         raise
-    except Exception as error:  # whatever the user's module does when it is imported
+    except Exception as error:  # any error of the user's module at its import
         place = place_of(error, module)
-        if place and module not in sys.modules:  # else it was imported, and lacks the attribute
-            raise UnknownName(f"no {kind} '{name}': its module fails with {place}; mend it there") from error
+        if place and module not in sys.modules:  # otherwise it was imported and lacks the attribute
+            raise UnknownName(f"no {kind} '{name}': its module fails with {place}; correct it there") from error
         raise UnknownName(
             f"no {kind} '{name}': {error}; write 'module:Class' of something that can be imported from PYTHONPATH"
         ) from error
@@ -243,7 +243,7 @@ def read_array(file: IO[bytes]) -> AnyArray:
     except BROKEN_CONTENT as error:
         raise FileRefused(f'it has no array that can be read: {type(error).__name__}: {error}') from error
     if array.dtype.kind == 'U' and array.size and array.view(np.uint32).max(initial=0) > LAST_CHARACTER:
-        raise FileRefused('it promises texts, and holds what are not characters')
+        raise FileRefused('it is declared as text, and contains bytes that are not characters')
     return array
 
 
@@ -315,10 +315,10 @@ def _real(path: str | Path) -> Path:
 
 
 # --------------------
-# Read YAML and JSON as plain values, whoever wrote them: nothing is run. Figures are written as JSON here, too.
+# Read YAML and JSON of any origin as plain values: nothing is run. Figures are also written as JSON here.
 
 MAX_CHARACTERS = 100_000  # of YAML, which take 3 s at worst; the longest settings in use have a tenth
-MAX_VALUES = 200_000  # of YAML with every alias written out: who walks through them would not come to an end
+MAX_VALUES = 200_000  # of YAML with every alias expanded, as a loop over all would hardly end
 MAX_CARD_BYTES = 5 * MB
 # What the parsers raise, depending on what is wrong; a value such as 2024-99-99 or !!bool x is no YAMLError.
 PARSE_ERRORS = (
@@ -341,7 +341,7 @@ def load_yaml(path: Path, what: str) -> Any:
 
 
 def load_card(path: Path) -> Any:
-    """Return what stands under `recipe` in a model's card (JSON)."""
+    """Return the value of `recipe` in a model card (JSON)."""
     try:
         return load_json(path, MAX_CARD_BYTES).get('recipe')
     except PARSE_ERRORS as error:
@@ -355,7 +355,7 @@ def parse_yaml(text: str) -> Any:
     # The tree of nodes has each alias once: values are counted before any is made.
     node = yaml.compose(text, yaml.SafeLoader)
     if node is not None and _count_values(node, {}) > MAX_VALUES:
-        raise ValueError(f'its aliases stand for more than {MAX_VALUES} values; write less')
+        raise ValueError(f'its aliases expand to more than {MAX_VALUES} values; reduce them')
     return yaml.safe_load(text)
 
 
@@ -383,7 +383,7 @@ def safe_repr(value: Any) -> str:
 
 
 def _count_values(node: yaml.Node, known: dict[int, float]) -> float:
-    """Return how many values a node stands for, each alias counted; infinite if it contains itself."""
+    """Return the number of values of a node with all aliases expanded; infinite if it contains itself."""
     if id(node) not in known:
         known[id(node)] = math.inf
         parts = node.value if isinstance(node, yaml.CollectionNode) else ()
@@ -410,7 +410,7 @@ def param(
     high: float | None = None,
     choices: Sequence[str] = (),
 ) -> Any:
-    """Return a dataclass field that knows its unit, range, choices and description.
+    """Return a dataclass field with its unit, range, choices and description in the metadata.
 
     Parameters
     ----------
@@ -453,9 +453,9 @@ class Parameter:
 
     @property
     def range_text(self) -> str:
-        """The allowed values in words, '' if all are."""
+        """The allowed values as text, '' if all are."""
         if self.choices:
-            return 'one of ' + ', '.join(filter(None, self.choices))  # the description says what '' is for
+            return 'one of ' + ', '.join(filter(None, self.choices))  # the description explains ''
         unit = f' {self.unit}' if self.unit else ''
         bounds = {
             (True, True): f'{self.low} to {self.high}{unit}',
@@ -513,14 +513,14 @@ def check_option(cls: type, name: str, value: Any) -> None:
 
 
 def from_mapping(cls: type[T], values: Mapping[str, Any], where: str = '') -> T:
-    """Build a parameter dataclass from a mapping (a YAML section); what is not named keeps its default."""
+    """Build a parameter dataclass from a mapping (a YAML section); parameters that it lacks keep their default."""
     if not (isinstance(cls, type) and dataclasses.is_dataclass(cls)):
         raise InvalidParameter(f'{where}: {cls!r} is not a class with parameters; name a dataclass')
     return cls(**_read(cls, values, where, _checked))
 
 
 def _read(cls: type, values: Any, where: str, check: Callable[[Parameter, Any, str], Any]) -> dict[str, Any]:
-    """Return what the parameters of a dataclass take of a mapping, each value checked."""
+    """Return the checked values of a mapping for the parameters of a dataclass."""
     known = {parameter.name: parameter for parameter in parameters_of(cls)}
     place = f'{where}: ' if where else ''
     if not isinstance(values, Mapping):
@@ -543,9 +543,9 @@ def _checked(parameter: Parameter, value: Any, where: str) -> Any:
 
 
 def tree_from_mapping(cls: type[T], values: Any, where: str) -> T:
-    """Build a dataclass whose fields are parameters, dataclasses of their own, or mappings of names to these.
+    """Build a dataclass whose fields are parameters, nested dataclasses, or mappings of names to these.
 
-    A number that stands where a text is needed is taken as text: YAML reads a column named 3 as a number.
+    A number in place of a text is converted to text: YAML reads a column named 3 as a number.
     """
     read = _read(cls, {} if values is None else values, where, _value)
     try:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What can go wrong, each with one sentence for the user: what came, what is allowed, what to do."""
+"""Errors, each with one sentence for the user: the value, what is allowed, what to do."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ import enum
 import re
 
 MAX_CHARACTERS = 1000
-# What Python puts around the words of the operating system: a number, and the path, which sentences name themselves.
+# What Python adds to the text of the operating system: a number, and the path, which messages already name.
 ERRNO = re.compile(r"\[Errno -?\d+\] ([^:'\"]*)(: '[^']*')?")
 
 
 class TextureError(Exception):
-    """Base of all errors that a user can cause or meet; its text, always one line, is shown to the user as it is."""
+    """Base of all errors that a user can cause or meet; its text, always one line, is shown to the user unchanged."""
 
     def __init__(self, sentence: str = '', field: str = '') -> None:
-        # What came, and what others said about it, may be many lines or long ones.
+        # A rejected value, or the error of a library, may have many or long lines.
         line = ' '.join(ERRNO.sub(r'\1', sentence).split())
         super().__init__(line if len(line) <= MAX_CHARACTERS else f'{line[: MAX_CHARACTERS - 1]}…')
-        self.field = field  # of a request, if one is to blame
+        self.field = field  # of the request that is invalid, if it is one field
 
 
 class UnknownName(TextureError):
-    """A name that no catalogue knows."""
+    """A name that is in no catalogue."""
 
 
 class InvalidParameter(TextureError):
@@ -43,7 +43,7 @@ class DeviceError(TextureError):
 
 
 class CommandRefused(DeviceError):
-    """A command that an arm or a hand does not carry out: not finite, too fast, or too hard."""
+    """A command that an arm or a hand refuses: not finite, too fast, or too much force."""
 
 
 class ExplorationError(enum.IntEnum):

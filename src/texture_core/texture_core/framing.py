@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Frames on a serial line: checked, numbered and timed, for devices of our own design.
+"""Frames on a serial line: checked, numbered and timed, for devices of this project.
 
     COBS( kind u8 | version u8 | sequence u16 | time_us u32 | rows u8 | columns u8 | body | crc u16 ) 00
 
 All numbers are little endian. COBS (consistent overhead byte stuffing) leaves no zero byte within a frame: whatever is
 lost or added on the way, the frame after the next zero is whole again. The checksum is CRC-16/CCITT-FALSE, also called
 IBM-3740 (polynomial 1021, start FFFF, of "123456789": 29B1), over everything before it. The sequence counts the frames
-of one kind, so each stream on a shared line knows its own losses. The time is the device's, of the first row; it wraps.
+of one kind, so losses are counted per stream. The time is that of the first row by the device's clock; it wraps.
 
 Source: Cheshire & Baker 1999, "Consistent Overhead Byte Stuffing".
 """
@@ -29,7 +29,7 @@ MAX_FRAME_BYTES = 4096
 
 
 class Frame(NamedTuple):
-    """One frame that passed the check; what `rows` and `columns` count is up to its kind."""
+    """One frame that passed the check; `rows` and `columns` depend on its kind."""
 
     kind: int
     version: int
@@ -69,12 +69,12 @@ class FrameDecoder:
         return frames
 
     def _decode(self, segment: bytes) -> Frame | None:
-        """Return the frame in what stood between two zero bytes, unless it is damaged or came before."""
+        """Return the frame in the bytes between two zeros, unless it is damaged or a repetition."""
         synchronised, self._synchronised = self._synchronised, True
         frame = unpack(segment) if len(segment) <= self._max_bytes else None
         if frame is not None:
             return self._check_sequence(frame)
-        # A line is joined in the middle of a frame, and a sender may add zeros at any time: both are no fault.
+        # Reading may begin in the middle of a frame, and a sender may add zeros at any time: both are no fault.
         self.bad_frames += bool(segment) and synchronised
         return None
 
@@ -104,7 +104,7 @@ def cobs_encode(data: bytes) -> bytes:
 
 
 def cobs_decode(stuffed: bytes) -> bytes:
-    """Return what `cobs_encode` was given; ValueError if it was not made by that rule."""
+    """Return the bytes encoded by `cobs_encode`; ValueError if the encoding is invalid."""
     data = bytearray()
     at = 0
     while at < len(stuffed):
@@ -120,7 +120,7 @@ def cobs_decode(stuffed: bytes) -> bytes:
 
 
 def unpack(segment: bytes) -> Frame | None:
-    """Return the frame in what stood between two zero bytes, or None if it is damaged."""
+    """Return the frame in the bytes between two zeros, or None if it is damaged."""
     try:
         raw = cobs_decode(segment)
     except ValueError:

@@ -65,7 +65,7 @@ DiagnosticReport = tuple[str, str, Mapping[str, Any]]
 
 
 class Diagnostics:
-    """Publish a status once a second, and whenever asked."""
+    """Publish a status once a second, and on request."""
 
     def __init__(
         self, node: Any, report: Callable[[], DiagnosticReport], hardware_id: str = '', period_s: float = 1.0
@@ -81,7 +81,7 @@ class Diagnostics:
         self._publish(*self._report())
 
     def end(self) -> None:
-        """Publish the status for the last time, and say so: a node that ends as asked is not one that fell silent."""
+        """Publish the status marked as the last one, so that a regular end is not reported as silence."""
         level, message, numbers = self._report()
         self._publish(level, message, {**numbers, ENDED: True})
         self._publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED_S))
@@ -100,7 +100,7 @@ class Diagnostics:
 
 
 def has_ended(status: DiagnosticStatus) -> bool:
-    """Return whether a status is the last one of a node that ended as asked."""
+    """Return whether a status is the last one of a node that ended regularly."""
     return any(value.key == ENDED for value in status.values)
 
 
@@ -109,24 +109,24 @@ def _text(value: Any) -> str:
 
 
 # --------------------
-# Names of frames on tf, which know no namespaces of their own.
+# Names of frames on tf, which has no namespaces.
 
 
 def frame_name(namespace: str, name: str) -> str:
-    """Return what a frame is called on tf that a node in a namespace calls `name`: 'left/fingertip'."""
+    """Return the name on tf of the frame `name` of a node in a namespace, such as 'left/fingertip'."""
     if '/' in name or not name:
         return name
     return f'{namespace.strip("/")}/{name}'.lstrip('/')
 
 
 # --------------------
-# A lifecycle node that outlives a request which its state does not allow.
+# A lifecycle node that survives a request which its state does not allow.
 
 
 class PatientLifecycleNode(LifecycleNode):
     """Refuse an unknown or untimely transition; rclpy raises it as an error, which would end the process.
 
-    rclpy offers no place to refuse it but its own private method: the service handler asks that one.
+    rclpy offers no place to refuse it but a private method, which the service handler calls.
     """
 
     def _LifecycleNodeMixin__change_state(self, transition_id: int) -> TransitionCallbackReturn:  # noqa: N802
@@ -153,7 +153,7 @@ UNBOUNDED = 1e300
 
 
 def declare(node: Any, cls: type[T], *, changeable: bool = False) -> T:
-    """Declare every field of `cls` with its description, unit and range; return the values the node was given."""
+    """Declare every field of `cls` with its description, unit and range; return the values of the node."""
     for item in parameters_of(cls):
         if node.has_parameter(item.name):
             continue
@@ -175,7 +175,7 @@ def read(node: Any, cls: type[T]) -> T:
 
 
 def on_change(node: Any, cls: type[T], apply: Callable[[T], None]) -> None:
-    """Call `apply` with the new values before a change of parameters is accepted; what it refuses is not set."""
+    """Call `apply` with the new values before a change of parameters is accepted; refused values are not set."""
     known = {item.name for item in parameters_of(cls)}
 
     def check(changes: list[RosParameter]) -> SetParametersResult:
@@ -199,8 +199,8 @@ MISSPELLED = 0.85
 def check_names(node: Any) -> None:
     """Refuse a parameter that was given and is nearly one of the node's; log a warning for others that are unknown.
 
-    Names in the node's `names_elsewhere`, if it has them, belong to what it did not choose: they are not misspelled.
-    A node with `shares_file` takes only what it knows from the file of another node, such as the pose of a surface.
+    Names in the node's `names_elsewhere`, if it has them, belong to alternatives that it did not choose.
+    A node with `shares_file` reads only its parameters from the file of another node, such as the pose of a surface.
     """
     if getattr(node, 'shares_file', False):
         return
@@ -213,7 +213,7 @@ def check_names(node: Any) -> None:
         if near and name not in elsewhere:
             raise InvalidParameter(
                 f"node '{node.get_name()}' has no parameter '{name}'; did you mean '{near[0]}'? Correct the name, or, "
-                "if it is another node's, give it in the section of that node"
+                'if it belongs to another node, give it in the section of that node'
             )
         node.get_logger().warning(f'this has no effect: {unknown_name(name, declared, "parameter")}')
 
@@ -327,15 +327,15 @@ def run(
         if node is not None:
             getattr(node, 'shutdown', lambda: None)()
             if executor is not None:
-                executor.shutdown(ANSWERING_S)  # who waited for an answer still gets it
+                executor.shutdown(ANSWERING_S)  # a client that waits for an answer still gets it
             node.destroy_node()
         rclpy.try_shutdown()
-        for number in STOP_SIGNALS:  # one more must not end a process that is ending
+        for number in STOP_SIGNALS:  # another one must not interrupt the shutdown
             signal.signal(number, signal.SIG_IGN)
 
 
 def _wake_on_signals(executor: Executor) -> None:
-    """Let a signal end the executor's wait at once: Python's own handlers run only after it."""
+    """Let a signal end the executor's wait at once: Python runs its handlers only after it."""
     reader, writer = socket.socketpair()
     writer.setblocking(False)
     signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
@@ -344,7 +344,7 @@ def _wake_on_signals(executor: Executor) -> None:
         while reader.recv(1):
             executor.wake()
 
-    # Both ends live as long as the process; the thread keeps no node alive.
+    # Both ends exist as long as the process; the thread keeps no node alive.
     threading.Thread(target=wait, daemon=True, name='signals').start()
     _KEPT.append(writer)
 
@@ -353,11 +353,11 @@ _KEPT: list[socket.socket] = []
 
 
 # --------------------
-# Run a node inside a command, as if it had been started by itself.
+# Run a node inside a command, like a separately started one.
 
 
 def run_node(make_node: Callable[[], Any], parameters: Mapping[str, Any], namespace: str = '') -> None:
-    """Run a node with parameters until it ends or is told to stop.
+    """Run a node with parameters until it ends or is stopped.
 
     A user's error ends the program with exit code 2 and one sentence, as for any node.
     """
@@ -416,30 +416,30 @@ def to_msg(value: Any) -> Any:
 
 
 def from_msg(message: Any) -> Any:
-    """Return the data class of a message of texture_msgs; InvalidData if the message contradicts itself."""
+    """Return the data class of a message of texture_msgs; InvalidData if the message is inconsistent."""
     return CODEC.from_message(message, OF_MESSAGES[type(message)])
 
 
 # --------------------
-# An executor for nodes some of whose callbacks wait long, as a service that answers only when the motion is over.
+# An executor for nodes with callbacks that wait long, such as a service that answers after the motion.
 
 ANSWER_POLL_S = 0.02
 
 
 class WaitingExecutor(SingleThreadedExecutor):
-    """Run callbacks one after the other, but those of a ReentrantCallbackGroup each in a thread of its own.
+    """Run callbacks one after the other, but each of a ReentrantCallbackGroup in a separate thread.
 
-    Goals of action servers run in threads of their own, too. rclpy's MultiThreadedExecutor would do, but in Jazzy it
+    Goals of action servers also run in separate threads. rclpy's MultiThreadedExecutor would do, but in Jazzy it
     does not sleep while a callback waits for a thread (ros2/rclpy #1547): with 100 messages of a sensor a second it
     takes 80 % of a core and starves the other threads of the process, such as the one that moves the arm.
     """
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
-        self._aside: list[Any] = []  # tasks in threads of their own
+        self._aside: list[Any] = []  # tasks in separate threads
 
     def shutdown(self, timeout_sec: float | None = None) -> bool:
-        """Send the answers of what has waited, for `timeout_sec` at most, and run no callback any more.
+        """Send the answers of waiting callbacks, for `timeout_sec` at most, and start no further callback.
 
         The result of an action is sent by a callback that follows the one of the goal; rclpy's executor drops it.
         """
@@ -453,7 +453,7 @@ class WaitingExecutor(SingleThreadedExecutor):
             return self._context.ok() and any(not task.done() for task, _entity, _node in self._tasks)
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Let one callback begin; raise what a callback has raised."""
+        """Start one callback; raise the error of a callback."""
         with contextlib.suppress(TimeoutException, ShutdownException, ExternalShutdownException):
             task, entity, _node = self.wait_for_ready_callbacks(timeout_sec)
             if entity is not None and not isinstance(entity.callback_group, ReentrantCallbackGroup):

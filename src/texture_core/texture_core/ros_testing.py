@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Start nodes as processes, and a graph of one's own for a test."""
+"""Start nodes as processes, and a separate ROS graph for a test."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from rclpy.parameter import Parameter
 from texture_core.errors import DeviceError
 
 # --------------------
-# Nodes of the suite as processes of their own: start, watch the computing time, stop.
+# Nodes of the suite as processes: start, measure the computing time, stop.
 
 ENDS_WITHIN_S = 20.0
 TICKS_PER_S = os.sysconf('SC_CLK_TCK')
@@ -50,7 +50,7 @@ def killed_on_error(process: subprocess.Popen[Any]) -> Iterator[None]:
 
 
 class NodeProcess:
-    """A node in its own process, from `with` to the end of the block."""
+    """A node in a separate process, from `with` to the end of the block."""
 
     def __init__(
         self,
@@ -74,7 +74,7 @@ class NodeProcess:
         domain = {} if domain_id is None else {'ROS_DOMAIN_ID': str(domain_id)}
         self._environment = {**os.environ, 'PYTHONUNBUFFERED': '1', **domain}
         self._process: subprocess.Popen[bytes] | None = None
-        # A file and not a pipe: a node that says much must not wait for a reader.
+        # A file and not a pipe: a node with much output must not wait for a reader.
         self._folder = tempfile.TemporaryDirectory(prefix=f'{node}_')
         self._log = Path(self._folder.name) / 'output'
 
@@ -95,11 +95,11 @@ class NodeProcess:
 
     @property
     def output(self) -> str:
-        """What the node has said so far."""
+        """The output of the node so far."""
         return self._log.read_text(encoding='utf-8', errors='replace')
 
     def wait(self, timeout_s: float) -> int:
-        """Return the exit code of a node that ends by itself."""
+        """Wait for the end of a node; return its exit code."""
         return self.process.wait(timeout_s)
 
     def stop(self, number: int = signal.SIGINT) -> int:
@@ -120,14 +120,14 @@ class NodeProcess:
 
 
 # --------------------
-# A ROS graph on this machine alone, for a test: nodes in one thread, waits on conditions, nothing left behind.
+# A ROS graph on this machine alone, for a test: nodes in one thread, waits on conditions, complete clean-up.
 
 NodeT = TypeVar('NodeT')
 POLL_S = 0.05
 
 
 class LocalGraph:
-    """Nodes under test and a `peer` that plays the others, from `with` to the end of the block."""
+    """Nodes under test and a `peer` in place of all others, from `with` to the end of the block."""
 
     def __init__(self, domain_id: int, deadline_s: float = 30.0) -> None:
         self._environment = {'ROS_DOMAIN_ID': str(domain_id), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
@@ -159,11 +159,11 @@ class LocalGraph:
         return received
 
     def spin_once(self, timeout_s: float = POLL_S) -> None:
-        """Let one thing happen."""
+        """Execute one callback."""
         self._executor.spin_once(timeout_sec=timeout_s)
 
     def until(self, condition: Callable[[], Any]) -> None:
-        """Let things happen until the condition holds."""
+        """Execute callbacks until the condition holds."""
         deadline = time.monotonic() + self._deadline_s
         while not condition():
             if time.monotonic() > deadline:

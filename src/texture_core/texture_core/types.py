@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What flows between the packages: signals, windows, features, estimates, explorations; and small types of all."""
+"""Data types of all packages: signals, windows, features, estimates, explorations."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from texture_core.errors import DeviceError, InvalidData
 
 
 class Quality(NamedTuple):
-    """How many messages are kept, whether each must arrive, and whether who joins late gets them."""
+    """Number of messages kept, whether each must arrive, and whether late subscribers get them."""
 
     depth: int
     reliable: bool
@@ -38,24 +38,24 @@ class Quality(NamedTuple):
 
 
 QUALITIES: Mapping[str, Quality] = {
-    # One second of 5 ms batches: a stalled subscriber loses samples, never holds the driver up.
+    # One second of 5 ms batches: a stalled subscriber loses samples and never blocks the driver.
     'signal': Quality(200, reliable=False, latched=False),
     'signal_static': Quality(200, reliable=False, latched=False),
-    # Few and small, none may be missing: the end of an exploration travels in them.
+    # Few and small, none may be missing: they carry the end of an exploration.
     'features': Quality(200, reliable=True, latched=False),
-    # Who joins late gets the newest estimates, and so the verdict on the last exploration.
+    # A late subscriber gets the newest estimates, and so the result of the last exploration.
     'texture': Quality(50, reliable=True, latched=True),
     'roughness': Quality(50, reliable=True, latched=True),
     # The labels of the estimates, once for each change of the model.
     'model_info': Quality(1, reliable=True, latched=True),
     # What the explorer can do, once for each change.
     'explorer_info': Quality(1, reliable=True, latched=True),
-    # A node that starts late learns at once what is going on.
+    # A node that starts late gets the present state at once.
     'exploration': Quality(100, reliable=True, latched=True),
 }
 
 # --------------------
-# Names for array types; the shape stands in the docstring of each function.
+# Names for array types; the docstring of each function gives the shape.
 
 Array = NDArray[np.float64]
 Samples = NDArray[np.float64]  # (..., n_samples, n_channels)
@@ -97,7 +97,7 @@ def _shown(label: str) -> str:
 
 NANOSECONDS = 1_000_000_000
 MIN_HZ = 1e-3  # a sample in a quarter of an hour: below, stamps leave what 64 bits hold
-MAX_HZ = 1e6  # seconds of samples are kept: a rate from nowhere would take all memory
+MAX_HZ = 1e6  # seconds of samples are kept: an arbitrary rate could take all memory
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +160,7 @@ class TactileSignal:
 
     @property
     def common_unit(self) -> str:
-        """The unit that all channels share; '' if they differ or are unknown."""
+        """Common unit of all channels; '' if they differ or are unknown."""
         return self.units[0] if len(set(self.units)) == 1 else ''
 
     @property
@@ -189,7 +189,7 @@ def join_batches(batches: Sequence[TactileSignal], anchors_ns: Iterable[int] = (
             groups[-1].append(batch)
         else:
             groups.append([batch])
-    return [replace(own[0], samples=np.concatenate([batch.samples for batch in own])) for own in groups]
+    return [replace(group[0], samples=np.concatenate([batch.samples for batch in group])) for group in groups]
 
 
 def _alike(one: TactileSignal, other: TactileSignal) -> bool:
@@ -235,8 +235,8 @@ class FeatureVector:
 
     `feature_set` is the fingerprint of the windows, inputs and features that made the values: a model refuses
     vectors of another fingerprint. `skipped` counts the windows left out so far for lost or non-finite samples.
-    `sequence` counts the vectors that its sender has sent before: a jump is what was lost on the way.
-    `motion`, `direction_rad` and `sensor` say how the window was measured, as `speed_m_s` and `force_n` do.
+    `sequence` counts the vectors that its sender has sent before: a jump is a loss.
+    `motion`, `direction_rad` and `sensor` describe the measurement of the window, as `speed_m_s` and `force_n` do.
     """
 
     start_ns: int
@@ -281,7 +281,7 @@ class Rejection(enum.IntEnum):
 class TextureEstimate:
     """Which surface is being touched; label '' and no probabilities while there is no evidence.
 
-    A label of '' with probabilities: the evidence speaks for several surfaces alike, it is unclassified. There is one
+    A label of '' with probabilities: several surfaces are equally probable, it is unclassified. There is one
     probability for each label of the model, in the order of its ModelInfo.
     """
 
@@ -339,7 +339,7 @@ class RoughnessEstimate:
 
 
 # --------------------
-# What the exploring finger is asked to do, and what it is doing.
+# Request to the exploring finger, and its state.
 
 
 class Phase(str, enum.Enum):
@@ -364,7 +364,7 @@ ENDED = frozenset({Phase.IDLE, Phase.DONE, Phase.ABORTED})
 
 @dataclass(frozen=True)
 class ExplorationState:
-    """What the finger is doing from `stamp_ns` on; unknown numbers are NaN, unknown names ''.
+    """State of the finger from `stamp_ns` on; unknown numbers are NaN, unknown names ''.
 
     `steady_s` guarantees that phase, speed and force hold at least that long after the stamp. A window can be used as
     soon as its last sample arrives, without waiting for the next state.
@@ -391,7 +391,7 @@ class ExplorationState:
 
 @dataclass(frozen=True)
 class ExplorationRequest:
-    """What an operator asks for; a number of 0 means the default of the motion, a `timeout_s` of 0 no timeout.
+    """Request of an operator; a number of 0 means the default of the motion, a `timeout_s` of 0 no timeout.
 
     Raises
     ------
@@ -433,18 +433,18 @@ class ExplorationRequest:
 
 
 # --------------------
-# Data classes to messages and back, whoever made the classes of the messages: rclpy, or rosbags without ROS.
+# Data classes to messages and back, with the message classes of rclpy, or of rosbags without ROS.
 
 DATA_CLASSES = (
     TactileSignal, ExplorationState, FeatureVector, TextureEstimate, RoughnessEstimate, ModelInfo, ExplorationRequest,
 )  # fmt: skip
-STAMPS = ('stamp_ns', 'start_ns')  # the field that stands in the header
+STAMPS = ('stamp_ns', 'start_ns')  # field that is stored in the header
 # Fields that messages hold in standard types: times in s as a builtin_interfaces/Duration, and coordinates as the
 # geometry_msgs/Point `position`.
 DURATIONS: Mapping[str, str] = {'steady_s': 'steady', 'timeout_s': 'timeout', 'duration_s': 'duration'}
 POSITION = ('x_m', 'y_m', 'z_m')
 MAX_DURATION_S = 2.0**31
-Convert = Callable[[Any], Any] | None  # None: the same on both sides
+Convert = Callable[[Any], Any] | None  # None: the value is the same in both
 
 
 class MessageCodec:
@@ -459,8 +459,8 @@ class MessageCodec:
             Rejection: (int, _rejection),
             **convert,
         }
-        # By class: its field that is the time in the header, whether it has a position, and of each other field the
-        # names here and there, and what becomes of the value.
+        # By class: its field that is the time in the header, whether it has a position, and of each other field both
+        # names and the conversion of the value.
         self._plans: dict[type, tuple[str, bool, list[tuple[str, str, Convert, Convert]]]] = {}
 
     def to_message(self, value: Any) -> Any:
@@ -477,7 +477,7 @@ class MessageCodec:
         return self._kind(f'texture_msgs/msg/{cls.__name__}')(**values)
 
     def from_message(self, message: Any, cls: type) -> Any:
-        """Return the data class of a message; InvalidData if the message contradicts itself."""
+        """Return the data class of a message; InvalidData if the message is inconsistent."""
         stamp, has_position, rest = self._plans.get(cls) or self._plan(cls)
         values = {
             here: back(getattr(message, there)) if back else getattr(message, there) for here, there, _, back in rest
@@ -499,7 +499,7 @@ class MessageCodec:
     def _plan(self, cls: type) -> tuple[str, bool, list[tuple[str, str, Convert, Convert]]]:
         types = get_type_hints(cls)
         stamp = next((name for name in STAMPS if types.pop(name, None)), '')
-        types.pop('frame_id', None)  # in the header, too
+        types.pop('frame_id', None)  # also in the header
         has_position = POSITION[0] in types
         for name in POSITION:
             types.pop(name, None)
@@ -547,7 +547,7 @@ def _rejection(code: int) -> Rejection:
 # --------------------
 # How a finger slides, and which slides are of one kind.
 
-# Slides that differ by no more are of one kind: what an arm misses of the speed and force it was asked for.
+# Slides that differ by no more are of one kind: an arm reaches requested speed and force within this tolerance.
 TURNED_RAD, SPEED_RATIO, FORCE_RATIO = 0.1, 1.15, 1.3
 
 
@@ -581,13 +581,13 @@ def group_similar(motions: Sequence[SlideMotion]) -> list[SlideMotion]:
             founders.append(motion)
         groups.append(group)
     medians = [
-        _median([motion for motion, own in zip(motions, groups, strict=True) if own == k]) for k in range(len(founders))
+        _median([motion for motion, one in zip(motions, groups, strict=True) if one == k]) for k in range(len(founders))
     ]
     return [medians[group] for group in groups]
 
 
 def _median(motions: Sequence[SlideMotion]) -> SlideMotion:
-    """Return the motion with the medians of all numbers, rounded to what people would ask for."""
+    """Return the motion with the medians of all numbers, rounded to three digits."""
     heading = cmath.phase(sum(cmath.rect(1.0, motion.direction_rad) for motion in motions))
     speed, force, duration = (
         float(f'{median(getattr(motion, name) for motion in motions):.3g}')
@@ -601,7 +601,7 @@ def _within(one: float, other: float, factor: float) -> bool:
 
 
 # --------------------
-# Where emulated devices appear, and what emulated arms tell the emulator there: the state of the finger.
+# Folder of emulated devices, and the state of the finger that emulated arms send to the emulator there.
 
 # As $(env XDG_RUNTIME_DIR /tmp)/tactile_texture of the launch files.
 DEVICES = f'{os.environ.get("XDG_RUNTIME_DIR", "/tmp")}/tactile_texture'
@@ -614,7 +614,7 @@ PIPE_BYTES = 65536  # that a pipe of Linux holds: states of 2 s at 500 Hz
 def loopback_address(ip: str) -> str:
     """Return an IP address as it is, and for a path the loopback address that an emulated controller has by that path.
 
-    The ports of a controller are fixed, so that each emulated one needs an address of its own. Two paths have the same
+    The ports of a controller are fixed, so that each emulated one needs a separate address. Two paths have the same
     one with a probability of 1 in 16 million.
     """
     if '/' not in ip:
@@ -626,8 +626,8 @@ def loopback_address(ip: str) -> str:
 class FingerState:
     """Position, velocity and normal force of a fingertip at one time, in the frame of the surface.
 
-    x and y lie in the surface, z points away from it; m, m/s and N. `time_ns` is of CLOCK_MONOTONIC, which all
-    processes of one machine share: the receiver extrapolates from it.
+    x and y are in the surface, z points away from it; m, m/s and N. `time_ns` is of CLOCK_MONOTONIC, which is common
+    to all processes of one machine: the receiver extrapolates from it.
     """
 
     time_ns: int
@@ -640,7 +640,7 @@ class FingerState:
     force_n: float = 0.0
 
     def to_bytes(self) -> bytes:
-        """Return what is sent of it: magic, time, seven doubles, little endian."""
+        """Return the state as sent: magic, time, seven doubles, little endian."""
         return FORMAT.pack(MAGIC, *astuple(self))
 
     @classmethod
@@ -653,14 +653,14 @@ class FingerState:
 
 
 class FingerSender:
-    """Sends finger states into the named pipe of an emulator, which need not be there; the path '' sends none."""
+    """Sends finger states into the named pipe of an emulator, if it exists; the path '' sends none."""
 
     def __init__(self, path: str) -> None:
         self._path = str(Path(path).expanduser()) if path else ''
         self._pipe: int | None = None
 
     def send(self, state: FingerState) -> None:
-        """Send one state; it is lost if nobody reads, or nobody has read for long."""
+        """Send one state; it is lost without a reader, or if the pipe is full."""
         if not self._path:
             return
         try:
@@ -680,33 +680,33 @@ class FingerSender:
 
 
 class FingerReceiver:
-    """The emulator's end of the named pipe at a path, which it makes and removes."""
+    """The emulator's end of the named pipe at a path, which it creates and removes."""
 
     def __init__(self, path: str) -> None:
         self.received = 0
-        self.refused = 0  # pieces between states that are none
+        self.refused = 0  # invalid pieces between states
         self._path = Path(path).expanduser()
         self._rest = b''
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
             if not self._path.is_fifo():
                 os.mkfifo(self._path)
-            self._pipe = os.open(self._path, os.O_RDWR | os.O_NONBLOCK)  # also to write: it never ends with a sender
+            self._pipe = os.open(self._path, os.O_RDWR | os.O_NONBLOCK)  # also to write: it stays open without a sender
         except OSError as error:
             raise DeviceError(
                 f"the pipe '{path}' for the finger cannot be made: {error}; choose a path in a folder that you may "
-                'write to, where no other file stands'
+                'write to, where no other file exists'
             ) from error
         try:
             fcntl.flock(self._pipe, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
             os.close(self._pipe)
             raise DeviceError(
-                f"another emulator has the pipe '{path}' for the finger; end it, or give this one a namespace"
+                f"another emulator uses the pipe '{path}' for the finger; end it, or give this one a namespace"
             ) from error
 
     def states(self, wait_s: float = 0.0) -> list[FingerState]:
-        """Return what has come since the last call; if nothing has, what comes first within so long."""
+        """Return what has arrived since the last call; if nothing has, wait up to `wait_s` for the first."""
         if wait_s:
             select.select([self._pipe], [], [], wait_s)
         data = self._rest
@@ -771,7 +771,7 @@ def rotation_vector(matrix: Array) -> Array:
     trace = float(np.trace(matrix))
     squares = np.array([*(1.0 + 2.0 * np.diag(matrix) - trace), 1.0 + trace])  # 4·x², 4·y², 4·z², 4·w²
     largest = int(np.argmax(squares))
-    products = matrix + matrix.T  # 4·x·y and so on beside the diagonal
+    products = matrix + matrix.T  # 4·x·y and so on off the diagonal
     differences = np.array([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]])
     if largest == 3:
         quaternion = np.array([*differences, squares[3]])
@@ -788,7 +788,7 @@ def rotation_vector(matrix: Array) -> Array:
 
 
 # --------------------
-# What the parts of the suite expect of each other.
+# Protocols between the parts of the suite.
 
 
 class Sensor(Protocol):
@@ -798,8 +798,8 @@ class Sensor(Protocol):
     it may return nothing. A device that is gone raises DeviceError from `open` or `read`; the caller closes and
     opens again. `counts` are running totals of this sensor object, kept over reopening. A sensor may also have
     `details`: what it reports about itself, such as its 'serial number', by name, for the diagnostics; `limits`: the
-    lowest and the highest sample by topic, of all channels or of each, to tell when one is saturated; and `set_bias()`:
-    makes the device take its present state for none, and returns the seconds that this takes.
+    lowest and the highest sample by topic, of all channels or of each, to detect saturation; and `set_bias()`:
+    zeroes the device at its present state, and returns the seconds that this takes.
     """
 
     def open(self) -> None:

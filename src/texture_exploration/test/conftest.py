@@ -46,7 +46,7 @@ class Table:
         self.states, self.places = [], []
         self.exploration = None
         self.asleep_ns = 0
-        self.late_ns = 0  # delay of what the arm tells
+        self.late_ns = 0  # delay of the states of the arm
         self.signal_fault = no_signal_watch
         self.when = {}  # what to do at the third state of a phase
 

@@ -56,26 +56,26 @@ def explored(robot, kind, bad, phase, samples):
 @pytest.mark.parametrize('phase', PHASES)
 @pytest.mark.parametrize('name', BAD)
 def test_one_sample_that_cannot_be_meant_is_named_and_the_finger_lifted(make_robot, name, phase):
-    robot, (kind, bad, told) = make_robot(), BAD[name]
+    robot, (kind, bad, sentence) = make_robot(), BAD[name]
     outcome = explored(robot, kind, bad, phase, 1)
     assert robot.pressed_n[-1] == 0.0
     assert outcome.lifted
-    assert told in outcome.message and len(outcome.message) < LONGEST
+    assert sentence in outcome.message and len(outcome.message) < LONGEST
     assert outcome.error is ExplorationError.ARM_FAULT
 
 
 @pytest.mark.parametrize('name', ['force nan', 'force 1e308'])
 def test_a_sensor_that_goes_on_to_give_no_number_does_not_keep_the_finger_pressed(make_robot, name):
-    robot, (kind, bad, told) = make_robot(), BAD[name]
+    robot, (kind, bad, sentence) = make_robot(), BAD[name]
     outcome = explored(robot, kind, bad, 'slide', 10**9)
     assert robot.pressed_n[-1] == 0.0
-    assert told in outcome.message and len(outcome.message) < LONGEST
+    assert sentence in outcome.message and len(outcome.message) < LONGEST
 
 
 def test_an_arm_whose_place_stays_unknown_is_stopped_and_named(make_robot):
-    kind, bad, told = BAD['place nan']
+    kind, bad, sentence = BAD['place nan']
     outcome = explored(make_robot(), kind, bad, 'slide', 10**9)
-    assert told in outcome.message
+    assert sentence in outcome.message
     assert not outcome.lifted
 
 

@@ -58,7 +58,7 @@ def test_the_guard_of_a_killed_process_keeps_the_arm_until_it_ends(name):
     with holding(name, 'with a guard') as process:
         process.kill()
         process.wait()
-        with pytest.raises(DeviceError, match='or its guard still brings it to rest'):
+        with pytest.raises(DeviceError, match='or its guard still stops it'):
             claim(name, 0.1)
         process.stdin.close()  # ends the guard, too
         os.close(claim(name, 20.0))

@@ -110,7 +110,7 @@ def test_steps_that_are_late_again_and_again_do_not_hide_an_arm_that_hangs(table
 def test_steps_that_are_late_again_and_again_do_not_hide_a_sensor_that_is_silent(table):
     late_every(table, 8)
     table.signal_fault = SignalWatch(0.5, lambda: table.now_ns).signal_fault
-    assert table.explore().message.startswith("no samples have come on 'signal'")
+    assert table.explore().message.startswith("no samples on 'signal'")
 
 
 def test_a_slide_that_was_over_before_it_was_seen_is_no_success(table):
@@ -177,9 +177,7 @@ def test_a_sensor_that_falls_silent_lifts_the_finger_within_150_ms(table, phase)
     table.pace = pace
     table.when[phase] = lambda: fell_silent.append(table.now_ns)
     outcome = table.explore()
-    assert re.fullmatch(
-        r"no samples have come on 'signal' for 1[23]\d ms; check the sensor and its node", outcome.message
-    )
+    assert re.fullmatch(r"no samples on 'signal' for 1[23]\d ms; check the sensor and its node", outcome.message)
     assert table.arm.state().force_n == 0
     if phase is not Phase.LIFT:
         lifted_ns = next(s.stamp_ns for s in table.states if s.phase is Phase.LIFT)
@@ -213,7 +211,7 @@ def test_the_finger_rests_until_the_first_sample_and_then_explores(table):
 def test_without_a_sample_the_finger_is_never_lowered(table):
     seen = watch_with_heights(table, first_sample_s=math.inf)
     outcome = table.explore()
-    assert outcome.message.startswith("no samples have come on 'signal' for 5")
+    assert outcome.message.startswith("no samples on 'signal' for 5")
     assert seen[-1][0] >= 0.5
     assert min(height for _, height in seen) == 0.0
     assert Phase.APPROACH not in table.phases
@@ -237,9 +235,9 @@ def test_a_machine_that_slept_does_not_take_the_sensor_for_silent(table):
     watch = SignalWatch(0.12, lambda: table.now_ns)
 
     def signal_fault(listening):
-        told = watch.signal_fault(listening)
+        message = watch.signal_fault(listening)
         watch.on_samples()
-        return told
+        return message
 
     table.signal_fault = signal_fault
     table.when[Phase.SLIDE] = table.sleep
@@ -247,7 +245,7 @@ def test_a_machine_that_slept_does_not_take_the_sensor_for_silent(table):
 
 
 # What happens in the slide, how soon it is detected (a step of the exploration, or the allowed age of the state), and
-# what is told.
+# the expected sentence.
 FORCE, FAULT = ExplorationError.FORCE_LIMIT, ExplorationError.ARM_FAULT
 HAPPENINGS = {
     'a stop': (lambda table: table.exploration.stop('enough'), 0.02, ExplorationError.STOPPED, 'enough'),
@@ -266,7 +264,7 @@ HAPPENINGS = {
 
 @pytest.mark.parametrize('name', HAPPENINGS)
 def test_whatever_ends_a_slide_ends_it_within_100_ms_and_the_next_exploration_works(name, table, record_property):
-    happens, soon_s, error, told = HAPPENINGS[name]
+    happens, soon_s, error, expected = HAPPENINGS[name]
     happened, moved = [], []
     go_on = table.pace
 
@@ -282,11 +280,11 @@ def test_whatever_ends_a_slide_ends_it_within_100_ms_and_the_next_exploration_wo
     table.when[Phase.SLIDE] = now
     outcome = table.explore()
     assert (outcome.success, outcome.error) == (False, error)
-    assert re.search(told, outcome.message)
+    assert re.search(expected, outcome.message)
     detected_ns = next(s.stamp_ns for s in table.states if s.phase in (Phase.LIFT, Phase.ABORTED))
     record_property('detected_s', (detected_ns - happened[0]) * 1e-9)
     assert (detected_ns - happened[0]) * 1e-9 <= soon_s
-    # An arm that hangs does not tell that its command has run out.
+    # An arm that hangs does not report that its command has run out.
     if name != 'an arm that hangs':
         assert all(time_ns <= detected_ns + 100_000_000 for time_ns, slides in moved if slides)
     assert table.phases[-1] is Phase.ABORTED

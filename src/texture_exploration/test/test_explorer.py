@@ -45,7 +45,7 @@ def test_a_fault_in_a_users_planner_is_told_with_its_file_and_line(explorer, tmp
     with pytest.raises(MotionRefused) as refused:
         explorer.begin('one', ExplorationRequest('users_planner:plan'))
     assert refused.value.error == ExplorationError.INVALID_REQUEST
-    assert f'failed with ZeroDivisionError: division by zero ({file}:2); mend it there' in str(refused.value)
+    assert f'failed with ZeroDivisionError: division by zero ({file}:2); correct it there' in str(refused.value)
 
 
 @pytest.mark.parametrize(

@@ -45,7 +45,7 @@ def request_of(timeout_s=0, **fields):
 
 
 class Client(Node):
-    """Somebody who asks, listens and, if told to, estimates."""
+    """A client that calls, subscribes and, on request, estimates."""
 
     def __init__(self):
         super().__init__('client')
@@ -156,7 +156,7 @@ def test_a_finger_that_may_be_pressed_is_lifted_at_the_start_if_that_is_asked_fo
 def test_a_service_call_explores_and_reports(world):
     before = world.client.get_clock().now().nanoseconds
     response = world.explored(world.call(**QUICK, surface='cork'))
-    assert (response.error_code, response.message, response.lifted) == (OK, 'the motion ended as asked', True)
+    assert (response.error_code, response.message, response.lifted) == (OK, 'the motion was completed', True)
     assert not response.texture.label
     world.until_phase('done')
     assert world.phases(response.exploration_id) == ['approach', 'contact', 'slide', 'lift', 'done']
@@ -225,7 +225,7 @@ def test_without_any_sensor_an_exploration_aborts_by_default_and_says_what_to_ch
     world = make_world(watch_signal=True)
     response = world.explored(world.call(**QUICK))
     assert response.error_code == Result.ERROR_NO_SIGNAL
-    assert response.message.startswith("no samples have come on 'signal' for")
+    assert response.message.startswith("no samples on 'signal' for")
     assert response.message.endswith('check the sensor and its node')
 
 
@@ -239,7 +239,7 @@ def test_a_sensor_that_falls_silent_in_the_slide_ends_it_and_the_next_exploratio
     sensor.cancel()
     response = world.explored(call)
     assert (response.error_code, response.lifted) == (Result.ERROR_NO_SIGNAL, True)
-    assert response.message.startswith("no samples have come on 'signal' for")
+    assert response.message.startswith("no samples on 'signal' for")
     sensor.reset()
     assert world.explored(world.call(**QUICK)).error_code == OK
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What befalls a robot in the middle of a slide: told in time and in words, and the next exploration works."""
+"""Faults of a robot in the middle of a slide: reported in time and in a sentence, and the next exploration works."""
 
 import functools
 import re
@@ -31,7 +31,7 @@ pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
 DEADLINE_S = 30.0
 TRIES = 3  # on a machine so busy that the robot seems silent, it may not come to a slide
-BUSY_S = 0.5  # a machine that stalls tells later; the figures are recorded
+BUSY_S = 0.5  # a stalled machine reports later; the figures are recorded
 HEIGHT_M = 0.003
 UR = UrControllerParams(ip='127.0.0.56', start_height_m=HEIGHT_M, force_offset_n=0.0, unlock_delay_s=0.2)
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.04)
@@ -43,7 +43,7 @@ TOUCH = TouchParams(approach_speed_m_s=0.02, speed_tolerance=0.3, force_toleranc
 
 @pytest.fixture(scope='module')
 def controller():
-    """Return the process of the emulated UR controller, whose faults are all mended."""
+    """Return the process of the emulated UR controller, whose faults are all repaired."""
     with ControllerProcess(UR) as controller:
         yield controller
 
@@ -89,7 +89,7 @@ def hold(motors):
 
 
 STALLED = 'the finger stalled: in 250 ms it moved by'
-# Robot, module it needs, what happens, how it is mended, what is told, and how soon at most.
+# Robot, module it needs, fault, repair, expected sentence, and latest time.
 LOST = 'lost|silent|not answered|ended'
 FAULTS = {
     'ur freezes': (ur, 'rtde_control', ControllerProcess.freeze, ControllerProcess.resume, 'silent|not answered', 0.15),
@@ -134,7 +134,7 @@ FAULTS = {
 
 
 def test_every_arm_has_a_test_of_a_finger_that_stalls():
-    tested = {name.split()[0] for name, (*_, told, _soon_s) in FAULTS.items() if told is STALLED}
+    tested = {name.split()[0] for name, (*_, expected, _soon_s) in FAULTS.items() if expected is STALLED}
     assert tested | {'ros_controllers'} == set(ARMS)  # that one in test_ros_controllers, in its own time
 
 
@@ -153,13 +153,13 @@ def explored(explorer, request, on_slide=None):
 def test_a_fault_in_the_slide_is_reported_in_time_and_the_next_exploration_works(
     name, request, tmp_path, record_property
 ):
-    robot, module, happens, mended, told, soon_s = FAULTS[name]
+    robot, module, happens, repair, expected, soon_s = FAULTS[name]
     pytest.importorskip(module)
     with ExitStack() as open_now:
         place = request.getfixturevalue('controller') if robot in (ur, patient_ur) else tmp_path
         device, arm, slide = open_now.enter_context(robot(place))
         # On a busy machine, too, the motor that is silent shall be named, and a finger that stalls.
-        patience_s = 1.0 if told is STALLED else 0.4 if robot is hand else SafetyLimits().state_timeout_s
+        patience_s = 1.0 if expected is STALLED else 0.4 if robot is hand else SafetyLimits().state_timeout_s
         limits = SafetyLimits(state_timeout_s=patience_s, x_high_m=0.5)  # each UR begins where the last one ended
         states = []
         explorer = Explorer(arm, TOUCH, limits, states.append)
@@ -174,12 +174,12 @@ def test_a_fault_in_the_slide_is_reported_in_time_and_the_next_exploration_works
         detected_s = (next(over).stamp_ns - since_ns) * 1e-9
         record_property('detected_s', detected_s)
         print(f'{name}: {detected_s * 1e3:.0f} ms, ended {ended_s * 1e3:.0f} ms later: {outcome.message}')
-        assert re.search(told, outcome.message), outcome.message
+        assert re.search(expected, outcome.message), outcome.message
         assert detected_s < soon_s + BUSY_S
         assert ended_s < 0.1 + BUSY_S
-        mended(device)
-        if 'protective' in told:
-            explorer.recover()  # all others are mended by the next request
+        repair(device)
+        if 'protective' in expected:
+            explorer.recover()  # all others are repaired by the next request
         explorer.limits = replace(limits, state_timeout_s=1.0)
         again, _ = explored(explorer, replace(slide, distance_m=0.02))
         assert again.outcome.success, again.outcome.message

@@ -69,12 +69,12 @@ def test_a_pause_of_this_machine_after_the_touch_makes_no_force_late(pause_s):
 
 
 def test_a_force_that_goes_on_to_rise_is_named():
-    assert stood(lambda s: 0.03 + s).startswith('the force went on to rise by 0.05 N while the finger stood')
+    assert stood(lambda s: 0.03 + s).startswith('the force continued to rise by 0.05 N while the finger was at rest')
 
 
 def test_a_harder_touch_than_the_declared_contact_allows_is_named():
-    told = 'the force rose by 0.45 N after the first touch, and 0.33 N are the most to expect'
-    assert stood(lambda s: 0.05 if s < 0.008 else 0.5).startswith(told)
+    expected = 'the force rose by 0.45 N after the first touch, and 0.33 N are the most to expect'
+    assert stood(lambda s: 0.05 if s < 0.008 else 0.5).startswith(expected)
 
 
 # Declared and true stiffness in N/m, delay in ms, noise in mN.

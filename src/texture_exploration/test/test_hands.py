@@ -163,7 +163,7 @@ def test_a_cable_that_is_pulled_out_stops_the_motors(bus, hand):
 def test_motors_that_were_stopped_by_their_watchdog_are_a_named_fault(bus, hand):
     hand.connect()
     bus.motors.tables[5][WATCHDOG] = TRIPPED
-    until(lambda: "motor 5 ('press' of middle) heard nothing for 0.3 s, and its watchdog stopped it" in fault_of(hand))
+    until(lambda: "motor 5 ('press' of middle) got no message for 0.3 s, and its watchdog stopped it" in fault_of(hand))
     until(lambda: torque_is_off(bus))
 
 
@@ -196,8 +196,8 @@ def test_a_goal_that_a_motor_refuses_is_a_named_fault(bus, hand):
 
 REFUSED = [
     ('xm430', {'models': [1020, 1010]}, r'model 1010 \(XH430-W210\) makes 1\.92 N·m/A at 1\.34 mA per count'),
-    ('leap', {'table': {'bus_watchdog': [100, 1]}}, "'bus_watchdog' stands at .* what protects would not be armed"),
-    ('leap', {'table': {'goal_current': [104, 2]}}, "'goal_current' stands at .* what protects would not be armed"),
+    ('leap', {'table': {'bus_watchdog': [100, 1]}}, "'bus_watchdog' stands at .* the protection would not be armed"),
+    ('leap', {'table': {'goal_current': [104, 2]}}, "'goal_current' stands at .* the protection would not be armed"),
     *[
         ('leap', {'fingers': {'thumb': {'press': {'id': 13, 'lever_m': lever_m}}}}, r'lever_m is .* 0\.001 to 0\.3')
         for lever_m in (-1.0, 0.0, 0.5)
@@ -352,7 +352,7 @@ def test_a_late_answer_to_an_earlier_question_is_not_taken_for_a_model_number(bu
 def test_two_motors_with_one_id_are_reported(bus, hand):
     bus.motors.twice = {5}
     hand.connect()
-    assert "motor 5 ('press' of middle) answers with what cannot be read: is its id given to two motors" in fault_of(
+    assert "motor 5 ('press' of middle) answers with data that cannot be read: do two motors have this id" in fault_of(
         hand
     )
 

@@ -22,7 +22,7 @@ ARM = RosControllersParams(
 )
 LIMITS = SafetyLimits(state_timeout_s=2.0, approach_timeout_s=60.0)
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.05)
-HELD = {'start_height_m': 0.003, 'command_timeout_s': 0.0}  # as a controller that holds the last velocity for ever
+HELD = {'start_height_m': 0.003, 'command_timeout_s': 0.0}  # as a controller that keeps executing the last velocity
 DEADLINE_S = 60.0
 
 

@@ -69,7 +69,7 @@ def test_an_arm_that_needs_a_longer_rise_to_zero_its_force_sensor_gets_it(table,
 
 
 def test_a_state_from_before_the_zero_of_its_force_is_no_contact(table, lifting_first, monkeypatch):
-    """An arm with a thread of its own may tell that it is zeroed between a state and the question."""
+    """An arm with a thread of its own may report its zero between a state and the check."""
     rested, state = 0, table.arm.state
 
     def seen():
@@ -90,7 +90,7 @@ CHANGING = {
     'swings': (lambda reading: 2.0 * (reading.time_ns // 50_000_000 % 2), 'the force changed by 2.00 N'),
     'falls slowly': (
         lambda reading: -120.0 * reading.position[2],
-        'the force changed all the while the finger rose by 0.05',
+        'the force changed while the finger rose by 0.05',
     ),
 }
 

@@ -134,13 +134,13 @@ REFUSED = [
     ('linear_slide', {'direction_rad': 1e3}, INVALID, 'direction_rad is 1000; allowed is -100 to 100 rad'),
     ('linear_slide', {'direction_rad': math.inf}, INVALID, 'direction_rad is inf'),
     ('linear_slide', {'distance_m': math.nan}, INVALID, 'distance_m is nan'),
-    ('linear_slide', {'radius_m': 0.02, 'turns': 2.0}, UNUSED, 'knows no radius_m and no turns; leave it at 0'),
+    ('linear_slide', {'radius_m': 0.02, 'turns': 2.0}, UNUSED, 'does not use radius_m and turns; leave it at 0'),
     ('linear_slide', {'distance_m': 0.9}, OUTSIDE, 'distance_m is 0.9, which'),
     # 0.2 m of room, less the ramp of 0.1 s and the steady 0.05 s at 0.05 m/s.
     ('linear_slide', {'distance_m': 2.0, 'speed_m_s': 0.05}, OUTSIDE, "0.192 m from x 0.000 and y 0.000 m, as 'x_high"),
     ('linear_slide', {'distance_m': 0.195, 'speed_m_s': 0.05, 'direction_rad': math.pi}, OUTSIDE, 'at most 0.192 m'),
     ('circular', {'radius_m': 0.5}, INVALID, 'circular: radius_m is 0.5; allowed is 0.005 to 0.1 m'),
-    ('circular', {'distance_m': 0.1}, UNUSED, 'circular knows no distance_m; leave it at 0'),
+    ('circular', {'distance_m': 0.1}, UNUSED, 'circular does not use distance_m; leave it at 0'),
     ('circular', {'radius_m': 0.005, 'speed_m_s': 0.2}, INVALID, 'at most 0.158 m/s'),
     ('circular', {'radius_m': 0.1}, OUTSIDE, 'at most 0.05 m'),
     ('in_hand_sliding', {'speed_m_s': 0.1, 'distance_m': 0.01}, INVALID, 'of a stroke, is 0.01; allowed is 0.0'),
@@ -423,10 +423,10 @@ def test_a_finger_that_trembles_across_its_path_does_not_get_ahead():
 def test_a_ramp_keeps_to_the_acceleration_and_takes_half_the_speed_in_the_mean():
     speed, acceleration = 0.2, 1.0
     duration = ramp_s(speed, acceleration)
-    shares = [k / 1000 for k in range(1001)]
-    steepest = max(smooth(b) - smooth(a) for a, b in pairwise(shares)) * 1000
+    fractions = [k / 1000 for k in range(1001)]
+    steepest = max(smooth(b) - smooth(a) for a, b in pairwise(fractions)) * 1000
     assert steepest * speed / duration == pytest.approx(acceleration, rel=1e-3)
-    mean = sum(map(smooth, shares)) / len(shares)
+    mean = sum(map(smooth, fractions)) / len(fractions)
     assert 2 * mean * speed * duration == pytest.approx(ramps_m(speed, duration) - 0.05 * speed)
 
 

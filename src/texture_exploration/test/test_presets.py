@@ -36,8 +36,8 @@ def test_the_first_paper_slid_at_three_speeds_and_three_forces_half_a_second_eac
     assert max(request.distance_m for request in preset.requests) == pytest.approx(0.1 + 0.2 * LATE_S)
 
 
-# What the papers tell: speeds, forces, headings, distances or radii or durations, and how often.
-TOLD = {
+# Values of the papers: speeds, forces, headings, distances or radii or durations, and how often.
+PUBLISHED = {
     'ets-linear-headings': {'distance_m': {0.05 + 0.1 * LATE_S}, 'direction_rad': {0, 30, 45, 90}, 'repeats': 50},
     'ets-circular': {'radius_m': {0.02}, 'direction_rad': {0, 30, 45, 90}, 'repeats': 50},
     'ets-ten-textures': {'speed_m_s': {0.125}, 'force_n': {2.0}, 'distance_m': {0.1 + 0.125 * LATE_S}, 'repeats': 200},
@@ -56,11 +56,11 @@ TOLD = {
 }
 
 
-@pytest.mark.parametrize('name', TOLD)
+@pytest.mark.parametrize('name', PUBLISHED)
 def test_a_preset_holds_what_its_paper_reports(name):
-    preset, told = load_preset(name), dict(TOLD[name])
-    assert preset.repeats == told.pop('repeats')
-    for key, values in told.items():
+    preset, published = load_preset(name), dict(PUBLISHED[name])
+    assert preset.repeats == published.pop('repeats')
+    for key, values in published.items():
         found = {getattr(request, key) for request in preset.requests}
         shown = {math.degrees(value) for value in found} if key == 'direction_rad' else found
         assert sorted(shown) == pytest.approx(sorted(values))

@@ -256,7 +256,7 @@ def test_a_stale_pose_or_force_commands_zero_velocity_within_100_ms(robot, what)
     robot.pass_time(0.2, ArmCommand(tangential_m_s=(0.02, 0.0)))
     first_ns = next(time_ns for time_ns, velocity in robot.sent if time_ns > begin_ns and not any(velocity))
     assert (first_ns - begin_ns) * 1e-9 <= 0.1
-    assert f'no {what} has come on' in robot.driven.state().fault
+    assert f'no {what} has arrived on' in robot.driven.state().fault
     assert not any(velocity != (0.0, 0.0, 0.0) for time_ns, velocity in robot.sent if time_ns >= first_ns)
 
 
@@ -265,7 +265,7 @@ def test_a_broadcaster_that_repeats_an_old_pose_counts_as_stale(robot):
     frozen = robot.newest_pose()
     robot.newest_pose = lambda: frozen
     robot.pass_time(0.1, ArmCommand(tangential_m_s=(0.02, 0.0)))
-    assert 'no pose has come' in robot.driven.state().fault
+    assert 'no pose has arrived' in robot.driven.state().fault
 
 
 def test_a_command_that_is_not_repeated_ends_in_zero_velocity(robot):
@@ -306,10 +306,10 @@ def test_a_controller_that_ends_is_named(robot):
     robot.pass_time(0.1, ArmCommand(tangential_m_s=(0.02, 0.0)))
     robot.heard_by = 0
     robot.pass_time(0.01, ArmCommand(tangential_m_s=(0.02, 0.0)))
-    assert "nobody listened on 'twist_controller/twist'" in robot.driven.state().unsafe
+    assert "no node subscribed to 'twist_controller/twist'" in robot.driven.state().unsafe
     assert robot.is_commanded_to_rest
     robot.pass_time(0.3, ArmCommand(tangential_m_s=(0.02, 0.0)))
-    assert "nobody listens on 'twist_controller/twist' any more" in robot.driven.state().fault
+    assert "no node subscribes to 'twist_controller/twist' any more" in robot.driven.state().fault
     robot.heard_by = 1
     robot.driven.recover()
     robot.pass_time(0.1, ArmCommand(tangential_m_s=(0.02, 0.0)))
@@ -317,7 +317,7 @@ def test_a_controller_that_ends_is_named(robot):
 
 
 class BrokenLink(Robot):
-    """A controller that holds the last velocity for ever, and a link to it that breaks."""
+    """A controller that keeps executing the last velocity, and a link to it that breaks."""
 
     commands_arrive = True
 
@@ -413,13 +413,13 @@ def test_a_controller_that_is_gone_for_6_ms_in_the_slide_ends_it_with_the_finger
     outcome, _ = robot.explore(SLIDE, TouchParams(), on_slide=lambda: gone_ns.append(robot.now_ns))
     assert gone_ns
     assert not outcome.success
-    assert 'listened on' in outcome.message
+    assert 'no node subscribed' in outcome.message
     assert outcome.lifted
     assert robot.arm.finger().force_n == 0.0
     assert robot.arm.finger().z_m > 0.001
 
 
-@pytest.mark.parametrize('why', ["'/other' commands the arm, too", 'the guard process has ended'])
+@pytest.mark.parametrize('why', ["'/other' also commands the arm", 'the guard process has ended'])
 def test_what_makes_the_arm_unsafe_while_it_obeys_ends_the_slide_with_the_finger_lifted(why):
     robot = Robot(replace(NO_NOISE, start_height_m=0.003, force_noise_n=0.002))
     robot.connect()
@@ -438,10 +438,10 @@ def test_what_makes_the_arm_unsafe_while_it_obeys_ends_the_slide_with_the_finger
 
 def test_a_process_that_was_told_to_end_waits_for_no_controller_and_commands_nothing(monkeypatch):
     robot = Robot(connect_timeout_s=30.0)
-    told = threading.Event()
-    told.set()
-    monkeypatch.setattr('texture_exploration.arms.arm.ENDING', told)
-    with pytest.raises(DeviceError, match='given up, as this process was told to end'):
+    ending = threading.Event()
+    ending.set()
+    monkeypatch.setattr('texture_exploration.arms.arm.ENDING', ending)
+    with pytest.raises(DeviceError, match='aborted, as this process was asked to end'):
         robot.driven.connect()
     assert not any(any(velocity) for _, velocity in robot.sent)
 
@@ -511,8 +511,8 @@ def test_a_late_arm_that_limits_its_speed_still_follows():
     [
         ({'frames': ('world', 'tool0_controller')}, 'the pose on .* is given in the frame'),
         ({'frames': ('base', 'wrist')}, 'the force on .* is given in the frame'),
-        ({'force_comes': False, 'heard_by': 0}, r"no force comes on .*; nobody listens on 'twist_controller/twist'"),
-        ({'unsafe_because': "'/other' commands the arm, too"}, 'commands the arm, too'),
+        ({'force_comes': False, 'heard_by': 0}, r"no force arrives on .*; no node subscribes to 'twist_controller"),
+        ({'unsafe_because': "'/other' also commands the arm"}, 'also commands the arm'),
     ],
 )
 def test_a_connection_that_may_not_be_is_refused_by_name_and_commands_nothing(found, said):
@@ -592,9 +592,9 @@ def explorer_over(robot):
     return explorer
 
 
-def press_at(robot, x_m, y_m, z_m=0.0, share=2.0):
+def press_at(robot, x_m, y_m, z_m=0.0, fraction=2.0):
     """Press a place as an operator would, `z_m` above the surface, with so many times the least force of a touch."""
-    depth_m = share * TouchParams().contact_force_n / robot.arm.params.stiffness_n_m
+    depth_m = fraction * TouchParams().contact_force_n / robot.arm.params.stiffness_n_m
     robot.arm.position = robot.arm._origin + robot.arm._axes @ [x_m, y_m, z_m - depth_m]
     robot.pass_time(0.02)
     return depth_m
@@ -614,7 +614,7 @@ def test_a_tilted_surface_is_found_by_four_touches_and_the_last_shows_the_residu
     assert patch.patch_x_high_m - patch.patch_x_low_m == pytest.approx(0.05, abs=0.002)
     explorer.connect()
     for place in ((0.01, -0.03), (-0.04, 0.02)):
-        press_at(robot, *place, share=0.0)
+        press_at(robot, *place, fraction=0.0)
         assert robot.driven.state().position[2] == pytest.approx(depth_m, abs=1e-6)
     normal = rotation_matrix(robot.driven.surface_pose[3:])[:, 2]
     assert normal == pytest.approx(robot.arm._axes[:, 2])
@@ -632,8 +632,8 @@ def test_touches_that_are_forgotten_are_made_again(robot):
 
 def test_a_touch_below_the_contact_force_is_refused_with_both_forces(robot):
     explorer = explorer_over(robot)
-    for share, said in ((0.0, '0.00'), (0.5, '0.10')):
-        press_at(robot, 0.0, 0.0, share=share)
+    for fraction, said in ((0.0, '0.00'), (0.5, '0.10')):
+        press_at(robot, 0.0, 0.0, fraction=fraction)
         with pytest.raises(MotionRefused, match=rf'the force is {said} N, and 0\.2 N are needed'):
             explorer.touch_surface()
     assert explorer.forget_touches() == 0
@@ -660,7 +660,7 @@ def noisy():
 def test_a_force_that_always_comes_half_a_second_late_by_its_stamp_is_refused_before_it_moves(noisy):
     noisy.hold_up_force(0.5)
     outcome, _ = noisy.explore(PRESS, TouchParams())
-    assert re.search(r'comes 50\d ms after its stamp, and 80 ms are allowed', outcome.message)
+    assert re.search(r'arrives 50\d ms after its stamp, and 80 ms are allowed', outcome.message)
     assert not any(any(velocity) for _, velocity in noisy.sent)
 
 
@@ -787,7 +787,7 @@ def test_clocks_that_do_not_agree_say_nothing_about_age(noisy, clock_ahead_s):
 
 def test_a_finger_that_is_found_pressed_is_lifted_until_nothing_touches_it(robot, monkeypatch):
     explorer = robot.explorer()
-    press_at(robot, 0.0, 0.0, share=0.0)
+    press_at(robot, 0.0, 0.0, fraction=0.0)
     robot.arm.position = robot.arm._origin - [0.0, 0.0, 0.002]
     robot.pass_time(0.05)
     assert robot.arm.finger().force_n == pytest.approx(4.0)
@@ -804,7 +804,7 @@ def test_a_check_commands_nothing_and_leaves_the_topics():
     robot.driven.check()
     assert (robot.sent, robot.closed) == ([], True)
     robot.pose_comes = False
-    with pytest.raises(DeviceError, match='no pose comes on'):
+    with pytest.raises(DeviceError, match='no pose arrives on'):
         robot.driven.check()
     assert robot.sent == []
 
@@ -863,7 +863,7 @@ def test_a_refused_switch_ends_the_connection_and_one_that_was_done_is_undone():
         robot.driven.connect()
     assert (robot.switched, robot.closed) == ([TAKEN], True)
     robot.pose_comes = False
-    with pytest.raises(DeviceError, match='no pose comes'):
+    with pytest.raises(DeviceError, match='no pose arrives'):
         robot.driven.connect()
     assert robot.switched[1:] == [TAKEN, GIVEN_BACK]
 
@@ -877,7 +877,7 @@ def test_controllers_that_cannot_be_switched_back_are_a_warning():
     assert robot.driven.warning() == 'the controllers were not switched back: the manager refused'
 
 
-# What is not as the arm is told, and the largest true force in any direction that follows, N.
+# Deviation from the parameters of the arm, and the largest true force in any direction that follows, N.
 WALL = {'wall_m': 0.02, 'friction': 0.3}
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=5.0, distance_m=0.06)
 TRAVEL_M = 0.06

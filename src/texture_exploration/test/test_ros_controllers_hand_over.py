@@ -33,7 +33,7 @@ from texture_exploration.ros import guard as guard_process
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
 PATIENT = RosControllersParams(connect_timeout_s=30.0, accept_no_timeout=True, accept_shared_group=True)
-HELD = {'start_height_m': 0.003, 'command_timeout_s': 0.0}  # as a controller that holds the last velocity for ever
+HELD = {'start_height_m': 0.003, 'command_timeout_s': 0.0}  # as a controller that keeps executing the last velocity
 DEADLINE_S = 60.0
 MANAGED = {
     'arm': 'managed_arm:ManagedArm',

@@ -119,7 +119,7 @@ def test_the_emulator_is_told_where_the_finger_is(clock, tmp_path):
     with closing(FingerReceiver(str(tmp_path / 'finger'))) as emulator:
         arm = make(clock, finger_pipe=str(tmp_path / 'finger'), start_height_m=0.0)
         run(arm, clock, ArmCommand(tangential_m_s=(0.1, 0.0), normal_m_s=-0.1), 0.004)
-        told = emulator.states()[-1]
+        sent = emulator.states()[-1]
         arm.close()
-    assert (told.time_ns, told.vx_m_s, told.x_m) == (4_000_000, 0.1, pytest.approx(0.0004))
-    assert told.force_n == pytest.approx(0.8)
+    assert (sent.time_ns, sent.vx_m_s, sent.x_m) == (4_000_000, 0.1, pytest.approx(0.0004))
+    assert sent.force_n == pytest.approx(0.8)

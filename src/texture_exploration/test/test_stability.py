@@ -41,9 +41,9 @@ def test_the_matrix_predicts_the_running_controller_step_by_step(delay):
     asked, error, predicted, measured = [0.0] * 10, 1.0, [], []
     for _ in range(20):
         asked.append(running.update(error, loop.period_s))
-        share, whole = math.modf(round(delay / loop.period_s, 9))
+        fraction, whole = math.modf(round(delay / loop.period_s, 9))
         newer, older = asked[-1 - int(whole)], asked[-2 - int(whole)]
-        error += loop.stiffness_n_m * loop.period_s * ((1 - share) * newer + share * older)
+        error += loop.stiffness_n_m * loop.period_s * ((1 - fraction) * newer + fraction * older)
         state = matrix @ state
         measured.append(error)
         predicted.append(state[0])

@@ -48,9 +48,9 @@ def test_stamps_that_jump_by_50_ms_in_a_slide_are_no_speed(ahead_s):
     assert watch.flaw() == ''
 
 
-@pytest.mark.parametrize(('share', 'stalls'), [(0.3, False), (0.2, True), (-1.0, True)])
-def test_a_finger_counts_as_stalled_below_its_share_of_the_commanded_speed(share, stalls):
-    assert (watched(lambda s: share * SPEED_M_S * s, 1.0) is not None) is stalls
+@pytest.mark.parametrize(('fraction', 'stalls'), [(0.3, False), (0.2, True), (-1.0, True)])
+def test_a_finger_counts_as_stalled_below_its_fraction_of_the_commanded_speed(fraction, stalls):
+    assert (watched(lambda s: fraction * SPEED_M_S * s, 1.0) is not None) is stalls
 
 
 def test_noise_of_the_position_is_no_way():
@@ -102,8 +102,8 @@ def test_a_slide_as_asked_is_steady_and_without_flaw():
 def test_three_times_the_speed_is_not_steady_and_named_with_what_was_asked():
     steady, flaw = slid(speed=lambda s: 3.0)
     assert not any(steady[5:])
-    assert 'the mean speed of the slide was 0.0600 m/s, more than 20% off the 0.02 m/s that were asked for' in flaw
-    assert 'the speed of the slide reached 0.06 m/s, and 0.03 m/s are allowed with 0.02 m/s asked for' in flaw
+    assert 'the mean speed of the slide was 0.0600 m/s, more than 20% off the 0.02 m/s requested' in flaw
+    assert 'the speed of the slide reached 0.06 m/s, and 0.03 m/s are allowed with 0.02 m/s requested' in flaw
 
 
 def test_half_the_speed_is_no_success():
@@ -114,7 +114,7 @@ def test_a_short_peak_of_the_force_is_not_steady_and_named_although_the_mean_is_
     steady, flaw = slid(force_n=lambda s: 1.86 if 0.5 <= s < 0.56 else 1.0)
     assert [number for number, good in enumerate(steady) if not good] == [51, 52, 53, 54, 55, 56]
     assert flaw == (
-        "the force of the slide reached 1.86 N, and 1.5 N are allowed with 1 N asked for ('peak_force_fraction')"
+        "the force of the slide reached 1.86 N, and 1.5 N are allowed with 1 N requested ('peak_force_fraction')"
     )
 
 
@@ -138,8 +138,8 @@ def test_turns_are_no_part_of_the_speed_that_was_asked_for():
     assert watch.flaw() == ''
 
 
-@pytest.mark.parametrize('share', [1.86, 3.0])
-def test_a_force_that_departs_in_the_slide_is_no_success_and_no_window_is_cut_from_it(table, share, monkeypatch):
+@pytest.mark.parametrize('peak_n', [1.86, 3.0])
+def test_a_force_that_departs_in_the_slide_is_no_success_and_no_window_is_cut_from_it(table, peak_n, monkeypatch):
     monkeypatch.setattr(SimulatedArmParams, 'admittance_m_s_n', 7e-4)  # it gives way slowly
     table.when[Phase.SLIDE] = lambda: setattr(table, 'pressed_ns', table.now_ns)
     table.pressed_ns, go_on = None, table.pace
@@ -147,13 +147,13 @@ def test_a_force_that_departs_in_the_slide_is_no_success_and_no_window_is_cut_fr
     def pace():
         go_on()
         pressed_s = (table.now_ns - table.pressed_ns) * 1e-9 if table.pressed_ns else 0.0
-        wanted_n = share + 0.01 * math.sin(1e3 * pressed_s)  # a frozen force would be named instead
+        wanted_n = peak_n + 0.01 * math.sin(1e3 * pressed_s)  # a frozen force would be named instead
         table.arm.push(wanted_n - table.arm.true_force_n + table.arm._push_n if 0.5 < pressed_s < 0.65 else 0.0)
 
     table.pace = pace
     outcome = table.explore(ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.1))
     assert (outcome.success, outcome.slid) == (False, True)
-    assert "1 N asked for ('peak_force_fraction')" in outcome.message
+    assert "1 N requested ('peak_force_fraction')" in outcome.message
     sliding = [state for state in table.states if state.phase is Phase.SLIDE]
     pressed = [state for state in sliding if state.force_n > 1.5]
     assert len(pressed) > 5

@@ -85,6 +85,6 @@ DECLARED = {
 
 @pytest.mark.parametrize('name', DECLARED)
 def test_the_value_in_the_table_is_the_default_of_the_code(name):
-    value, told = DECLARED[name]
-    assert next(row.value for row in LIMITS if row.name == name) == told
-    assert f'{value:g}' in told
+    value, stated = DECLARED[name]
+    assert next(row.value for row in LIMITS if row.name == name) == stated
+    assert f'{value:g}' in stated

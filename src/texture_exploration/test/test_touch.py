@@ -16,7 +16,7 @@ TOUCH = TouchParams(approach_speed_m_s=0.1, approach_stiffness_n_m=2000.0)
 
 @pytest.mark.parametrize('force_n', [0.5, 1.4, 6.0])
 @pytest.mark.parametrize('watchdog_s', [0.1, 0.15, 0.9])
-def test_until_the_watchdog_stops_the_arm_the_force_stays_below_its_share_of_the_wanted_one(force_n, watchdog_s):
+def test_until_the_watchdog_stops_the_arm_the_force_stays_below_its_fraction_of_the_wanted_one(force_n, watchdog_s):
     speed_m_s = TOUCH.approach_m_s(force_n, watchdog_s)
     assert 2000.0 * speed_m_s * (watchdog_s + REACTION_S) == pytest.approx(1.5 * force_n)
 
@@ -44,7 +44,7 @@ def test_an_approach_that_is_too_slow_says_so(table):
     table.arm.state = lambda: replace(state(), watchdog_s=0.9)
     outcome = table.explore(ExplorationRequest('linear_slide', speed_m_s=0.01, force_n=1.0, distance_m=0.02))
     assert outcome.message.startswith('waited')
-    assert 'as the arm goes on for 900 ms when it hears nothing' in outcome.message
+    assert 'as the arm continues for 900 ms without a command' in outcome.message
 
 
 @pytest.mark.parametrize(('delay_s', 'allowed'), [(0.0, '0.125'), (0.02, '0.0514'), (0.05, '0.0273'), (0.1, '0.0153')])

@@ -59,7 +59,7 @@ UNLOCK_S = 0.2
 
 
 class EmulatedRig:
-    """The emulated controller, and the true state of its finger, as it tells the emulator."""
+    """The emulated controller, and the true state of its finger, as it is sent to the emulator."""
 
     def __init__(self, ip, **values):
         self._folder = tempfile.TemporaryDirectory()
@@ -169,7 +169,7 @@ def commands():
 
 @contextlib.contextmanager
 def listener(ip, port=30004, serve=None):
-    """Someone who takes connections and, unless told otherwise, never answers."""
+    """Someone who takes connections and, by default, never answers."""
     with socket.create_server((ip, port)) as server:
         if serve is not None:
             threading.Thread(target=serve, args=(server,), daemon=True).start()
@@ -279,7 +279,7 @@ def test_a_protective_stop_is_a_fault_that_recover_clears_without_a_new_process(
 def test_connecting_releases_no_protective_stop(arm, emulator):
     emulator.controller.ask('emulate protective stop')
     arm.close()
-    with pytest.raises(DeviceError, match=r'held by its safety system \(PROTECTIVE_STOP\); find out why'):
+    with pytest.raises(DeviceError, match=r'held by its safety system \(PROTECTIVE_STOP\); find the cause'):
         arm.connect()
     wait_for(lambda: 'releasing' in emulator.controller.ask('unlock protective stop'))  # as a person at the pendant
 
@@ -371,7 +371,7 @@ def test_a_controller_that_hangs_in_the_handshake_blocks_nobody_and_leaves_no_pr
     [
         (['Robotmode: POWER_OFF'], 'switch it on and release its brakes'),
         (['Robotmode: RUNNING', 'false'], 'switch the pendant to remote control'),
-        (['Robotmode: RUNNING', 'true', 'Safetymode: ROBOT_EMERGENCY_STOP'], r'\(ROBOT_EMERGENCY_STOP\); find out why'),
+        (['Robotmode: RUNNING', 'true', 'Safetymode: ROBOT_EMERGENCY_STOP'], r'\(ROBOT_EMERGENCY_STOP\); find'),
     ],
 )
 def test_an_arm_that_is_not_ready_is_refused_with_what_to_do(answers, sentence):
@@ -429,7 +429,7 @@ def test_without_the_upper_registers_a_fieldbus_that_holds_the_lower_ones_is_an_
 # --------------------
 # What would hurt the finger or the sample, with the true force from outside.
 
-ABOVE_PLANE_M = 0.008  # so much higher than the arm was told is the surface
+ABOVE_PLANE_M = 0.008  # height of the surface above its declared place
 PRESSING = ArmCommand(force_n=3.0)
 
 
@@ -688,7 +688,7 @@ def test_a_program_that_somebody_starts_meanwhile_is_a_fault_and_gets_no_command
         wait_for(lambda: arm.state().fault.startswith('its control program was stopped'))
         emulator.controller.ask('load external_control.urp')
         emulator.controller.ask('play')
-        wait_for(lambda: 'somebody else started one' in faulty(arm))
+        wait_for(lambda: 'another user started one' in faulty(arm))
         arm.close()
         assert emulator.controller.ask('programState') == 'PLAYING external_control.urp'
 

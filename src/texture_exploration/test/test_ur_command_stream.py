@@ -32,7 +32,7 @@ RISING = UrCommand(0, (0.0, 0.0, 0.05), None)
 
 
 class Control:
-    """Takes whatever comes, but refuses to zero the force sensor so many times; moves as it is told."""
+    """Takes whatever comes, but refuses to zero the force sensor a given number of times; moves as commanded."""
 
     def __init__(self, refusals):
         self.refusals = refusals

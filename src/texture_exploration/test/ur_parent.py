@@ -12,10 +12,10 @@ from texture_exploration.arms.ur import UrArm, UrArmParams
 
 arm = UrArm(UrArmParams(ip=sys.argv[1]))
 arm.connect()
-told = False
+reported = False
 while True:
     arm.command(ArmCommand(tangential_m_s=(0.02, 0.0)))
-    if not told and arm.state().velocity[0] > 0.01:
-        told = True
+    if not reported and arm.state().velocity[0] > 0.01:
+        reported = True
         print(arm.worker_pid, flush=True)
     time.sleep(0.02)

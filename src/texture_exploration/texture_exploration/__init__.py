@@ -3,7 +3,7 @@
 """Exploratory motions, the robots that perform them, and their safety.
 
 Data in: an `ExplorationRequest` with speed in m/s, force in N and lengths in m. Data out: `ExplorationState`, which
-says what the finger does and how long speed and force are guaranteed, and an outcome in one sentence.
+is the state of the finger and the time for which speed and force are guaranteed, and an outcome in one sentence.
 
 ```python
 from texture_core.types import ExplorationRequest

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""One exploration: the loop that ties a motion to an arm and watches over both, its end and its estimates."""
+"""One exploration: the control loop of a motion and an arm with its supervision, its end and its estimates."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from texture_exploration.safety import SafetyLimits
 
 
 def may_stop(estimate: TextureEstimate) -> bool:
-    """Return whether a texture estimate may end the slide; one whose confidence is not known may not."""
+    """Return whether a texture estimate may end the slide; one with unknown confidence may not."""
     return estimate.accepted and estimate.decided and estimate.confidence >= 0.0
 
 
@@ -40,7 +40,7 @@ class ExplorationEstimates:
         self._cancelled = False
 
     def update(self, estimate: TextureEstimate | RoughnessEstimate) -> None:
-        """Take over a newer estimate."""
+        """Take a newer estimate."""
         with self._changed:
             if isinstance(estimate, TextureEstimate):
                 self.texture = estimate
@@ -55,7 +55,7 @@ class ExplorationEstimates:
             return self._final(kinds)
 
     def cancel(self) -> None:
-        """End the waiting: no further estimate will arrive."""
+        """End the wait: no further estimate will arrive."""
         with self._changed:
             self._cancelled = True
             self._changed.notify_all()
@@ -65,7 +65,7 @@ class ExplorationEstimates:
 
 
 # --------------------
-# One exploration: the loop that ties a motion to an arm and watches over both.
+# One exploration: the control loop of a motion and an arm, with its supervision.
 
 LOGGER = logging.getLogger(__name__)
 MOST_CHARACTERS = 200  # of the message of an error, which may hold a whole array
@@ -89,7 +89,7 @@ class ExplorationOutcome:
 
     @property
     def success(self) -> bool:
-        """Whether it was done as requested."""
+        """Whether it was completed."""
         return self.error is ExplorationError.NONE
 
     @property
@@ -100,7 +100,7 @@ class ExplorationOutcome:
         return 'warning' if self.lifted else 'error'
 
     def sentence(self, exploration_id: str) -> str:
-        """Return what the log says."""
+        """Return the message for the log."""
         lifted = '' if self.success or not self.lifted else '; the finger was lifted'
         return f'{exploration_id}: {self.message}{lifted}'
 
@@ -116,7 +116,7 @@ STILL_MOVING = ExplorationOutcome(
 def new_id(time_ns: int, number: int, rng: np.random.Generator) -> str:
     """Return a readable unique id such as '20261120T235959-001-ab12': UTC since 1970, a running number, a random end.
 
-    The random end keeps two nodes apart that begin in the same second.
+    The random end distinguishes two nodes that begin in the same second.
     """
     begin = datetime.fromtimestamp(time_ns // 1_000_000_000, tz=timezone.utc)
     return f'{begin:%Y%m%dT%H%M%S}-{number:03d}-{rng.integers(0x10000):04x}'
@@ -135,7 +135,7 @@ def no_signal_watch(_listening: Listening) -> str:
 
 
 class Exploration:
-    """Step a motion until it ends, whatever happens to the arm."""
+    """Step a motion until it ends, also after faults of the arm."""
 
     def __init__(
         self,
@@ -153,7 +153,7 @@ class Exploration:
         self.exploration_id = exploration_id
         self.request = request
         self.outcome = ExplorationOutcome(
-            ExplorationError.INTERNAL, 'it broke off through an internal error; see the log', False, False
+            ExplorationError.INTERNAL, 'it was aborted by an internal error; see the log', False, False
         )
         self.ended = threading.Event()
         self.gaps = 0
@@ -167,7 +167,7 @@ class Exploration:
         self._force_watch = ForceWatch(limits, arm.force_reading, motion.force_n)
         self._guard = ForceGuard(limits)
         self._commanded = ArmCommand()
-        self._arm_state: ArmState | None = None  # the newest with numbers that can be meant
+        self._arm_state: ArmState | None = None  # the newest with plausible numbers
         self._stop: tuple[ExplorationError, str] | None = None
         self._finish_reason = ''
         self._abort: tuple[ExplorationError, str] | None = None  # the first reason counts
@@ -193,7 +193,7 @@ class Exploration:
         return self.outcome
 
     def _escape(self, error: Exception, pace: Callable[[], None]) -> None:
-        """Command zero and lift by a stage of its own, as what failed is not asked again; say so."""
+        """Command zero and lift by a separate stage without the failed part; report it."""
         LOGGER.exception('an exploration failed')
         reason, lifted = f'internal error, {type(error).__name__}: {error}'[:MOST_CHARACTERS], False
         try:
@@ -203,11 +203,11 @@ class Exploration:
             reason += f'; then {type(second).__name__}: {second}'[:MOST_CHARACTERS]
         how = 'see the log' if lifted else 'the finger was not lifted'
         self.outcome = ExplorationOutcome(ExplorationError.INTERNAL, f'{reason}; {how}', self._slid, lifted)
-        with contextlib.suppress(Exception):  # whoever takes the states may be what failed
+        with contextlib.suppress(Exception):  # the receiver of the states may be the failed part
             self._report(self._clock(), Phase.ABORTED, progress=self.state.progress)
 
     def _lift_alone(self, pace: Callable[[], None]) -> bool:
-        """Lift without anything else of the exploration; return whether the finger is free."""
+        """Lift without other parts of the exploration; return whether the finger is free."""
         arm, lift = self._sound_state(), self._motion.lift_from(self._sound_state().position)
         lift.begin(self._clock(), arm)
         while not arm_fault(arm, self._clock(), self._limits):
@@ -220,7 +220,7 @@ class Exploration:
         return False
 
     def _sound_state(self) -> ArmState:
-        """Return the newest state of the arm; numbers that cannot be meant are replaced and make it unsafe."""
+        """Return the newest state of the arm; implausible numbers are replaced and make it unsafe."""
         arm = self._arm.state()
         if self._arm_state is None:
             self._arm_state = arm
@@ -246,10 +246,10 @@ class Exploration:
             self._give_up(ExplorationError.ARM_FAULT, f'{fault}; the finger was not lifted')
             return True
         relative = self._guard.relative(arm, self._arm.zeroed)
-        trouble = self._stop or self._trouble(now_ns, arm, relative)
-        if trouble:
-            self._abort = self._abort or trouble
-            self._motion.abort(trouble[1])
+        reason = self._stop or self._reason_to_abort(now_ns, arm, relative)
+        if reason:
+            self._abort = self._abort or reason
+            self._motion.abort(reason[1])
         if self._awaits_samples():
             self._arm.command(ArmCommand())
             return False
@@ -277,11 +277,11 @@ class Exploration:
 
     @property
     def _error(self) -> ExplorationError:
-        """Why it is aborted so far, by itself or by its motion."""
+        """Why it is aborted, by the loop or by its motion."""
         return self._abort[0] if self._abort else self._motion.error
 
-    def _trouble(self, now_ns: int, arm: ArmState, relative: ArmState) -> tuple[ExplorationError, str] | None:
-        """Return why it must end; a finger that was pushed out of the workspace may come home first."""
+    def _reason_to_abort(self, now_ns: int, arm: ArmState, relative: ArmState) -> tuple[ExplorationError, str] | None:
+        """Return why it must end; a finger that was pushed out of the workspace may return first."""
         workspace_violation = self._limits.workspace_violation(arm)
         self._entered |= not workspace_violation
         frozen = self._force_watch.frozen(arm, self._commanded)
@@ -312,7 +312,7 @@ class Exploration:
         )
 
     def _overdue(self, now_ns: int) -> str:
-        """Return in a sentence that the exploration takes longer than its caller allows, '' if it does not."""
+        """Return in a sentence that the exploration exceeds the timeout of its caller, '' if it does not."""
         timeout_s = self.request.timeout_s
         late = timeout_s > 0.0 and (now_ns - self._begin_ns) * 1e-9 > timeout_s
         return f'the exploration took longer than its timeout of {timeout_s:g} s' if late else ''
@@ -330,7 +330,7 @@ class Exploration:
             error, message = self._end_of(step.phase)
             self.outcome = ExplorationOutcome(error, message, self._slid, self._motion.lifted)
             step = replace(step, phase=Phase.DONE if self.outcome.success else Phase.ABORTED)
-        # A promise that is withdrawn is told at once: until then windows may be cut on it.
+        # A withdrawn guarantee is published at once: until then windows may be cut by it.
         as_before = step.phase is self.state.phase and (step.steady_s > 0) is (self.state.steady_s > 0)
         if as_before and now_ns < self._next_state_ns:
             return
@@ -352,7 +352,7 @@ class Exploration:
         )
 
     def _end_of(self, phase: Phase) -> tuple[ExplorationError, str]:
-        """Return how an exploration ended whose motion did; one that ended as planned may still be no success."""
+        """Return the outcome of an exploration after its motion; a completed motion may still be no success."""
         if phase is not Phase.DONE:
             return self._error or ExplorationError.INTERNAL, self._motion.message
         if not self._slid:
@@ -377,7 +377,7 @@ class Exploration:
 
 
 def arm_fault(arm: ArmState, now_ns: int, limits: SafetyLimits, listening: Listening = WITHOUT_GAPS) -> str:
-    """Return in words why the arm would not follow a command, '' if it would."""
+    """Return why the arm would not follow a command, as text, '' if it would."""
     age_s = listening.silence_s(arm.time_ns, now_ns)
     if arm.fault:
         return f'the arm reports a fault: {arm.fault}'

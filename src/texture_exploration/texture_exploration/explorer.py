@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Owner of the arm: runs explorations, one at a time, each in a thread of its own."""
+"""Owner of the arm: runs explorations, one at a time, each in a separate thread."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ PERIOD_S = 0.01
 CLOSING_S = 10.0  # longer than any motion needs to lift
 
 
-GENTLE_N = 1.0  # nobody says how hard a finger found pressed presses: it rises as before a gentle slide
+GENTLE_N = 1.0  # the force of a finger found in contact is unknown: it rises as before a gentle slide
 
 
 class Explorer:
@@ -59,7 +59,7 @@ class Explorer:
         signal_fault: Callable[[Listening], str] = no_signal_watch,
     ) -> None:
         self.arm = arm
-        # These may be replaced; a running exploration keeps its own.
+        # These may be replaced; a running exploration keeps those of its start.
         self.touch, self.limits, self.patch = touch, limits, SurfacePatch()
         self.counts: Counter[str] = Counter(done=0, aborted=0, refused=0, internal_errors=0, late_steps=0)
         self._on_state = on_state
@@ -67,8 +67,8 @@ class Explorer:
         self._clock = clock
         self._lock = threading.Lock()
         self._home: Vector | None = None
-        self._lift_first = True  # nobody knows whether the finger presses
-        self._zero_n: Vector | None = None  # what the sensor showed before the first lift, until it is zeroed
+        self._lift_first = True  # contact state unknown
+        self._zero_n: Vector | None = None  # reading of the sensor before the first lift, until it is zeroed
         self.lifted = False  # known to be free of the surface
         self._current: Exploration | None = None
         self._thread: threading.Thread | None = None
@@ -79,7 +79,7 @@ class Explorer:
     def connect(self) -> Vector:
         """Reach the arm, or reach it again after a fault; return where explorations begin.
 
-        The next exploration lifts first, as nobody knows whether the finger presses.
+        The next exploration lifts first, as the contact state is unknown.
 
         Raises
         ------
@@ -95,7 +95,7 @@ class Explorer:
         return self._home
 
     def check_start(self) -> None:
-        """Return if explorations may begin where they would, so that nobody learns it from the first request.
+        """Return if explorations may begin at the present start, so that this is known before the first request.
 
         Raises
         ------
@@ -106,15 +106,15 @@ class Explorer:
             self._check_inside(self._home)
 
     def release(self) -> None:
-        """Abort, wait until the finger is lifted, let the arm go; until `connect`, requests are refused.
+        """Abort, wait until the finger is lifted, release the arm; until `connect`, requests are refused.
 
-        Explorations begin where the finger is at that `connect`: whoever had the arm meanwhile may have moved it, and
+        Explorations begin where the finger is at that `connect`: another controller may have moved it meanwhile, and
         the way back to the old place may be blocked.
         """
         self._lift_ends.set()
         with self._lock:
             self._released = True
-        self._end_motion('the explorer let go of the arm')
+        self._end_motion('the explorer released the arm')
         if not self.arm.keeps_start:
             self._home = None
 
@@ -130,7 +130,7 @@ class Explorer:
             return math.nan
 
     def arm_counts(self) -> Mapping[str, int]:
-        """Return what the arm counts by itself, nothing if it counts nothing or cannot be reached."""
+        """Return the totals of the arm, none if it has none or cannot be reached."""
         with contextlib.suppress(DeviceError):
             return self.arm.counts
         return {}
@@ -150,7 +150,7 @@ class Explorer:
         return current if current is not None and not current.ended.is_set() else None
 
     def begin(self, exploration_id: str, request: ExplorationRequest) -> Exploration:
-        """Begin an exploration in a thread of its own; wait for its event `ended`.
+        """Begin an exploration in a separate thread; wait for its event `ended`.
 
         Raises
         ------
@@ -165,9 +165,9 @@ class Explorer:
                 raise
             except Exception as error:  # a fault of a user's planner; nothing has moved
                 self.counts['refused'] += 1
-                told = place_of(error, request.motion.partition(':')[0]) or f'{type(error).__name__}: {error}'
+                why = place_of(error, request.motion.partition(':')[0]) or f'{type(error).__name__}: {error}'
                 raise MotionRefused(
-                    f"planning '{request.motion}' failed with {told}; mend it there", ExplorationError.INVALID_REQUEST
+                    f"planning '{request.motion}' failed with {why}; correct it there", ExplorationError.INVALID_REQUEST
                 ) from error
             self._current, self.lifted = exploration, False
             self._thread = threading.Thread(target=self._run, args=(exploration,), name='exploration', daemon=True)
@@ -175,7 +175,7 @@ class Explorer:
             return exploration
 
     def stop(self, reason: str) -> bool:
-        """Abort the running exploration; return whether there was one. Without one, the arm stands still anyway."""
+        """Abort the running exploration; return whether there was one. Without one, the arm is at rest."""
         self._lift_ends.set()
         current = self.current
         if current is None:
@@ -186,7 +186,7 @@ class Explorer:
         return True
 
     def recover(self) -> None:
-        """Free the arm from a fault, as it knows itself or by connecting again; whoever asks sees that it may move.
+        """Free the arm from a fault, by its recovery or by connecting again; the caller makes sure that it may move.
 
         The next exploration lifts first, as the finger may still press.
 
@@ -201,7 +201,7 @@ class Explorer:
             self._check_idle()
             self._lift_first = True
             if self.fault():
-                with contextlib.suppress(DeviceError):  # connecting again tells it too
+                with contextlib.suppress(DeviceError):  # connecting again also reports it
                     self.arm.recover()
             if self.fault():
                 self.connect()
@@ -209,7 +209,7 @@ class Explorer:
     def lift(self) -> float:
         """Lift a finger that a killed explorer may have left pressed, until nothing touches it; return the rise, m.
 
-        Whoever asks sees that the finger may rise; `stop` ends it.
+        The caller makes sure that the finger may rise; `stop` ends it.
 
         Raises
         ------
@@ -226,13 +226,13 @@ class Explorer:
             begin_m = self.arm.state().position[2]
             try:
                 self._rise()
-            except MotionAborted as trouble:
-                raise MotionRefused(f'the finger was not lifted: {trouble}') from trouble
+            except MotionAborted as error:
+                raise MotionRefused(f'the finger was not lifted: {error}') from error
             finally:
                 self.arm.stop()
             height_m, self.lifted = self.arm.state().position[2], True
             x_m, y_m, z_m = self._home
-            self._home = (x_m, y_m, max(z_m, height_m))  # a finger found pressed is no place to begin at
+            self._home = (x_m, y_m, max(z_m, height_m))  # a place in contact is no start
             return height_m - begin_m
 
     def _rise(self) -> None:
@@ -251,7 +251,7 @@ class Explorer:
             pace()
 
     def reboot(self) -> str:
-        """Reboot the motors that report an error; return what was done. The arm lets go, the next request connects.
+        """Reboot the motors that report an error; return what was done. The arm is released until the next request.
 
         Raises
         ------
@@ -265,7 +265,7 @@ class Explorer:
             return self.arm.reboot()
 
     def touch_surface(self) -> str:
-        """Take the place of the finger, which touches the surface, for the surface frame; return what came of it.
+        """Record the position of the finger in contact for the surface frame; return the result as text.
 
         From the fourth touch on the plane through all touches is the surface. The next exploration connects again and
         begins where the finger is then: lift it before.
@@ -292,11 +292,11 @@ class Explorer:
                     frame.place_to_base(state.position), frame.to_base((0.0, 0.0, 1.0)), frame.to_base((1.0, 0.0, 0.0))
                 )
             except InvalidData as error:
-                raise MotionRefused(f'the touch was not taken: {error}') from error
+                raise MotionRefused(f'the touch was not recorded: {error}') from error
             count = f'touch {len(self._touches)} taken with {state.force_n:.2f} N'
             missing = TOUCHES - len(self._touches)
             if fit is None:
-                last = ', away from the others: it shows whether the first three are right' if missing == 1 else 's'
+                last = ', far from the others: it checks the first three' if missing == 1 else 's'
                 return f'{count}; touch the surface at {missing} more place{last}'
             arm.move_surface(fit.pose)
             self.patch = fit.patch
@@ -309,16 +309,16 @@ class Explorer:
             )
 
     def _check_touch(self, force_n: float) -> None:
-        """Refuse a touch that the force does not prove."""
+        """Refuse a touch without sufficient force."""
         least_n = self.touch.contact_force_n
         if not self.arm.zeroed:
             raise MotionRefused(
-                'the touch was not taken: the force sensor is not zeroed, so it proves no contact; lift the finger by '
-                '10 mm, let it rest in the air for a second, and touch again'
+                'the touch was not recorded: the force sensor is not zeroed, so contact cannot be shown; lift the '
+                'finger by 10 mm, let it rest in the air for a second, and touch again'
             )
-        if not force_n >= least_n:  # so NaN is no touch either
+        if not force_n >= least_n:  # so NaN is also no touch
             raise MotionRefused(
-                f'the touch was not taken: the force is {force_n:.2f} N, and {least_n:g} N are needed '
+                f'the touch was not recorded: the force is {force_n:.2f} N, and {least_n:g} N are needed '
                 "('contact_force_n'); press the finger on the surface"
             )
 
@@ -339,7 +339,7 @@ class Explorer:
             raise MotionRefused('this arm has no base frame in which a surface could be placed')
 
     def close(self) -> None:
-        """Abort, wait until the finger is lifted, let the arm go."""
+        """Abort, wait until the finger is lifted, release the arm."""
         self._lift_ends.set()
         with self._lock:
             self._closed = True
@@ -381,7 +381,7 @@ class Explorer:
         )
 
     def _check_inside(self, start: Vector) -> None:
-        """Refuse a motion that begins outside: it would never be seen to leave, as with a wrong pose of the surface."""
+        """Refuse a motion that begins outside, as with a wrong pose of the surface: leaving would not be detected."""
         if outside := self.limits.outside(start):
             self._home = None  # the next request begins where the finger is then, as it has to be moved
             raise MotionRefused(
@@ -424,7 +424,7 @@ class Explorer:
 
 
 class Pacer:
-    """Wait until the next step is due; steps that were missed are not made up for."""
+    """Wait until the next step is due; missed steps are not repeated."""
 
     def __init__(self, period_s: float, clock: Callable[[], int]) -> None:
         self._period_ns = round(period_s * 1e9)

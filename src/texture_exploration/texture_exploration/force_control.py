@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Press with a wanted force by an arm that knows velocities alone.
+"""Press with a wanted force by an arm that accepts only velocities.
 
 The contact is a spring: F = k·(h − z), with h the height of the untouched surface under the finger. Each period T the
 controller sets the normal velocity
@@ -56,7 +56,7 @@ class LoopModel:
 
 def loop_matrix(loop: LoopModel) -> Array:
     """Return the matrix of the loop; the state is e, s if there is an integral part, and m + 1 velocities."""
-    share, whole = math.modf(round(loop.delay_s / loop.period_s, 9))
+    fraction, whole = math.modf(round(loop.delay_s / loop.period_s, 9))
     waiting = int(whole) + 1
     matrix = np.zeros((2 + waiting, 2 + waiting))
     answer = np.zeros(2 + waiting)
@@ -64,9 +64,9 @@ def loop_matrix(loop: LoopModel) -> Array:
     step = loop.stiffness_n_m * loop.period_s
     error = np.zeros(2 + waiting)
     error[0] = 1.0
-    error[1 + waiting] += step * share  # the oldest velocity
+    error[1 + waiting] += step * fraction  # the oldest velocity
     newer = answer if waiting == 1 else np.eye(2 + waiting)[waiting]
-    error += step * (1 - share) * newer
+    error += step * (1 - fraction) * newer
     matrix[0] = error
     matrix[1] = loop.period_s * error
     matrix[1, 1] += 1.0
@@ -77,20 +77,20 @@ def loop_matrix(loop: LoopModel) -> Array:
 
 
 def spectral_radius(loop: LoopModel) -> float:
-    """Return by how much a disturbance grows each period, the spectral radius; below 1 it dies out."""
+    """Return the growth of a disturbance per period, the spectral radius; below 1 it decays."""
     return float(np.abs(np.linalg.eigvals(loop_matrix(loop))).max())
 
 
 @lru_cache(maxsize=4096)
 def stability_limit_gain(loop: LoopModel) -> float:
-    """Return the gain from which the loop is unstable, m/s/N, by its eigenvalues; its own gain does not count."""
+    """Return the gain from which the loop is unstable, m/s/N, by its eigenvalues; `loop.gain` has no effect."""
     return lowest_unstable_gain(loop, lambda gain: spectral_radius(replace(loop, gain_m_s_n=gain)) < 1.0)
 
 
 def lowest_unstable_gain(loop: LoopModel, stable: Callable[[float], bool], bisections: int = BISECTIONS) -> float:
     """Return the lowest gain that is not stable, around that of the pure delay, π / 2 / (k · delay)."""
-    high = 2.5 / (loop.stiffness_n_m * loop.period_s)  # a pure integrator bears 2 / (k·T)
-    # Far below, the integral part makes a slow swing, which a short run could take for an unstable one.
+    high = 2.5 / (loop.stiffness_n_m * loop.period_s)  # a pure integrator is stable up to 2 / (k·T)
+    # Far below, the integral part makes a slow oscillation that looks unstable in a short run.
     low = 0.1 / (loop.stiffness_n_m * (loop.delay_s + loop.period_s))
     for _ in range(bisections):
         middle = math.sqrt(low * high)
@@ -99,20 +99,20 @@ def lowest_unstable_gain(loop: LoopModel, stable: Callable[[float], bool], bisec
 
 
 # --------------------
-# The one formula of all limits of speed: a contact presses by its stiffness times the way until the arm stands.
+# The common formula of all speed limits: a contact presses by its stiffness times the distance until the arm stops.
 
 
 def stopping_m_s(rise_n: float, stiffness_n_m: float, stop_s: float) -> float:
-    """Return the speed from which an arm that stands after `stop_s` presses a contact by `rise_n` more."""
+    """Return the speed from which an arm that stops after `stop_s` increases a contact force by `rise_n`."""
     return rise_n / (stiffness_n_m * stop_s)
 
 
 # --------------------
-# The declared contact, the gain that follows from it, and what the stability margin forbids.
+# The declared contact, its gain, and the limits of the stability margin.
 
 GAIN_MARGIN = 4.0  # below the stability limit: a delayed integrator is critically damped at π/2·e = 4.3
-INTEGRAL_SHARE = 20.0  # integral time by response time on the stiffest contact: damped at a tenth of the stiffness
-REACTION_PERIODS = 2.0  # from contact to the first answer, beside the delay
+INTEGRAL_RATIO = 20.0  # integral time by response time on the stiffest contact: damped at a tenth of the stiffness
+REACTION_PERIODS = 2.0  # from contact to the first response, in addition to the delay
 FORCE_SPEED_M_S = 0.05  # the highest normal speed under force control
 SLOWEST_APPROACH_M_S = 5e-5  # a slower descent over the usual 2 mm takes longer than 40 s
 TOUCHING_N = 0.03
@@ -124,7 +124,7 @@ class ForceLoopParams:
 
     loop_delay_s: float = param(
         0.008,
-        'Largest delay from a measured force to the motion that answers it; larger values lower the gain.',
+        'Largest delay from a measured force to the motion that responds to it; larger values lower the gain.',
         unit='s',
         low=0.0,
         high=0.1,
@@ -146,7 +146,7 @@ class ForceLoopParams:
     )
     touching_n: float = param(
         TOUCHING_N,
-        'Force above which the force control takes the finger for touching; it must exceed the noise of the '
+        'Force above which the force control treats the finger as in contact; it must exceed the noise of the '
         'force sensor. A larger force meets the surface harder.',
         unit='N',
         low=0.005,
@@ -159,7 +159,7 @@ class ForceLoopParams:
 
     def integral_s(self, period_s: float) -> float:
         """Return the time constant of the integral part: many response times on the stiffest contact."""
-        return INTEGRAL_SHARE / (self.gain_m_s_n(period_s) * self.max_stiffness_n_m)
+        return INTEGRAL_RATIO / (self.gain_m_s_n(period_s) * self.max_stiffness_n_m)
 
     def approach_m_s(self, period_s: float) -> float:
         """Return how fast the finger may come down: the impact on the stiffest contact stays below its limit."""
@@ -177,7 +177,7 @@ class ForceController:
         self._sum_ns = 0.0
 
     def restart(self) -> None:
-        """Forget the past errors."""
+        """Discard the past errors."""
         self._sum_ns = 0.0
 
     def update(self, error_n: float, dt_s: float) -> float:
@@ -192,15 +192,15 @@ class ForceController:
 
 
 # --------------------
-# The loop: come down, stand at the first touch until the force does, press.
+# The loop: come down, rest at the first touch until the force is constant, press.
 
 SLOWEST_M_S = 0.001  # below, the finger is at rest along the surface
-LEFT_SHARE = 0.5  # of the force that counts as touching, below which the finger has left
+LEFT_FRACTION = 0.5  # of the force that counts as touching, below which the finger has left
 LATE_S = 0.03  # beyond 'loop_delay_s', by which arm or force may be late
-HALF_S = 0.05  # of the time in which the force must stand, once the finger does
+HALF_S = 0.05  # of the time in which the force must be constant, once the finger is at rest
 FEWEST = 5  # samples in each half
-ROSE_SHARE = 0.5  # of the force that counts as touching, by which the mean of a half may exceed that of the other
-HARD = 2.0  # impacts as declared, beyond which the finger met the surface harder than it can have
+ROSE_FRACTION = 0.5  # of the force that counts as touching, by which the mean of a half may exceed that of the other
+HARD = 2.0  # impacts as declared, beyond which the impact is harder than possible
 
 
 class ContactState(NamedTuple):
@@ -224,21 +224,21 @@ class ForceLoop:
                 'arm or a softer fingertip, or allow a larger impact'
             )
         self._controller = ForceController(params.gain_m_s_n(period_s), params.integral_s(period_s), FORCE_SPEED_M_S)
-        self._touched_ns: int | None = None  # when the finger began to stand; None while it does not touch
+        self._touched_ns: int | None = None  # start of the rest after the touch; None without contact
         self._touched_n = 0.0  # the force then
-        self._stood: list[ContactState] = []  # what was measured since it must stand
+        self._resting: list[ContactState] = []  # states since the finger must be at rest
         self._heard = False
-        self.doubt = ''  # in a sentence, why nobody should press by this force
+        self.doubt = ''  # in a sentence, why this force must not be used for control
 
     def restart(self) -> None:
         """The finger is not under force control, or left the surface."""
         self._controller.restart()
-        self._touched_ns, self._heard, self._stood = None, False, []
+        self._touched_ns, self._heard, self._resting = None, False, []
 
     def velocity_m_s(self, wanted_n: float, contact: ContactState, speed_m_s: float, dt_s: float) -> float:
         """Return the normal velocity that leads to a wanted force, at a commanded speed along the surface."""
         touching_n = self._params.touching_n
-        if contact.force_n < (touching_n if self._touched_ns is None else LEFT_SHARE * touching_n):
+        if contact.force_n < (touching_n if self._touched_ns is None else LEFT_FRACTION * touching_n):
             self.restart()
             return -self.approach_m_s
         if self._touched_ns is None:
@@ -248,32 +248,32 @@ class ForceLoop:
             self._listen(self._touched_ns, contact)
             return 0.0
         if not sliding:
-            self._controller.restart()  # a spring at rest needs no integral part, and a soft one would swing by it
+            self._controller.restart()  # a spring at rest needs no integral part, and a soft one would oscillate
         return self._controller.update(wanted_n - contact.force_n, dt_s)
 
     def _listen(self, touched_ns: int, contact: ContactState) -> None:
-        """Stand until the force must have stopped to rise; what is late is decided by the stamps of the force."""
+        """Rest until the force must be constant; delays are found by the stamps of the force."""
         params = self._params
-        must_stand_ns = touched_ns + round((params.loop_delay_s + LATE_S) * 1e9)
-        if contact.time_ns <= must_stand_ns or (self._stood and contact.time_ns <= self._stood[-1].time_ns):
+        must_rest_ns = touched_ns + round((params.loop_delay_s + LATE_S) * 1e9)
+        if contact.time_ns <= must_rest_ns or (self._resting and contact.time_ns <= self._resting[-1].time_ns):
             return
-        self._stood.append(contact)
-        stood_ns = contact.time_ns - self._stood[0].time_ns
-        middle_ns = contact.time_ns - stood_ns // 2
-        first = [state.force_n for state in self._stood if state.time_ns <= middle_ns]
-        last = [state.force_n for state in self._stood if state.time_ns > middle_ns]
-        if stood_ns < 2e9 * HALF_S or min(len(first), len(last)) < FEWEST:
+        self._resting.append(contact)
+        resting_ns = contact.time_ns - self._resting[0].time_ns
+        middle_ns = contact.time_ns - resting_ns // 2
+        first = [state.force_n for state in self._resting if state.time_ns <= middle_ns]
+        last = [state.force_n for state in self._resting if state.time_ns > middle_ns]
+        if resting_ns < 2e9 * HALF_S or min(len(first), len(last)) < FEWEST:
             return
         self._heard, rose_n, met_n = True, fmean(last) - fmean(first), fmean(last) - self._touched_n
         most_n = params.touching_n + HARD * params.max_impact_n
-        if rose_n > ROSE_SHARE * params.touching_n:
-            what = f'the force went on to rise by {rose_n:.2f} N while the finger stood on the surface'
+        if rose_n > ROSE_FRACTION * params.touching_n:
+            what = f'the force continued to rise by {rose_n:.2f} N while the finger was at rest on the surface'
         elif met_n > most_n:
             what = f'the force rose by {met_n:.2f} N after the first touch, and {most_n:.2f} N are the most to expect'
         else:
             return
         self.doubt = (
             f"{what}: arm or force is later than 'loop_delay_s' of {1e3 * params.loop_delay_s:.0f} ms, or the contact "
-            f"stiffer than 'max_stiffness_n_m' of {params.max_stiffness_n_m:g} N/m; find what makes it late, such as a "
-            'filter, or declare it'
+            f"stiffer than 'max_stiffness_n_m' of {params.max_stiffness_n_m:g} N/m; find the cause of the delay, such "
+            'as a filter, or declare it'
         )

@@ -17,15 +17,15 @@ from texture_exploration.arms.arm import ArmCommand, ArmState, ForceReading, Vec
 from texture_exploration.safety import MOST_FORCE_N, MOST_M, SafetyLimits
 
 # --------------------
-# For how long nothing was heard while somebody listened.
+# Duration of a silence while the loop was running.
 
-# After a longer gap between two steps it was we who slept: the age of the arm's state says nothing about the arm.
+# After a longer gap between two steps this process slept: the age of the arm's state does not concern the arm.
 GAP_NS = 50_000_000
 
 
 @dataclass(frozen=True)
 class Listening:
-    """Since when the loop has listened, and its newest gap: a machine that slept says nothing about a sensor or an arm.
+    """Start of the loop and its newest gap: after a pause of the machine a silence does not concern sensor or arm.
 
     Only the newest gap is left out of a silence. If every gap were, a busy machine whose steps are late again and again
     would never notice that an arm or a sensor is silent.
@@ -36,10 +36,10 @@ class Listening:
     gap_end_ns: int = 0
 
     def silence_s(self, heard_ns: int, now_ns: int) -> float:
-        """Return for how long nothing was heard, s, without the part of it that lies in the newest gap."""
+        """Return the duration of the silence, s, without its part in the newest gap."""
         start_ns = max(heard_ns, self.since_ns)
         silent_ns = now_ns - start_ns
-        # Only the part of the gap after the last sign of life counts.
+        # Only the part of the gap after the last message counts.
         if self.gap_end_ns > start_ns:
             silent_ns -= self.gap_end_ns - max(self.gap_start_ns, start_ns)
         return silent_ns * 1e-9
@@ -49,11 +49,11 @@ WITHOUT_GAPS = Listening()
 
 
 # --------------------
-# What no arm and no sensor can mean.
+# Implausible numbers of arms and sensors.
 
 
 def impossible(what: str, numbers: Iterable[float], most: float, unit: str) -> str:
-    """Return in a short sentence which number nobody can have measured, '' if all may be."""
+    """Return in a short sentence which number is implausible, '' if none is."""
     for number in numbers:
         if not math.isfinite(number):
             return f'the arm reports a {what} that is no number ({number:g})'
@@ -63,9 +63,9 @@ def impossible(what: str, numbers: Iterable[float], most: float, unit: str) -> s
 
 
 def sound(arm: ArmState, before: ArmState) -> ArmState:
-    """Return the state; what nobody can have measured is replaced by what was `before` and makes it unsafe.
+    """Return the state; implausible numbers are replaced by those of `before` and make it unsafe.
 
-    A place that stays unknown grows old, so that the arm counts as silent; a force that stays unknown does not keep a
+    A place that stays unknown becomes old, so that the arm counts as silent; a force that stays unknown does not keep a
     finger from being lifted.
     """
     place = impossible('place', arm.position, MOST_M, 'm') or impossible('velocity', arm.velocity, MOST_M, 'm/s')
@@ -87,16 +87,16 @@ def sound(arm: ArmState, before: ArmState) -> ArmState:
 MIN_REPEATS = 3  # of one reading, before it can count as frozen
 FROZEN_TRAVEL_M = 0.00005  # along the normal, in contact, after which a force must have changed
 CONTACT_N = 0.1  # above the force in free air, which may stay the same for long
-HELD_SHARE = 0.1  # a force this close to the wanted one is being held
-ZEROING_S = 0.1  # an arm may zero its force sensor while it stands, or as it moves off
+HELD_FRACTION = 0.1  # a force this close to the wanted one is being held
+ZEROING_S = 0.1  # an arm may zero its force sensor at rest, or as it starts to move
 BEFORE = 1000  # states before the contact
-LOW_SHARE = 0.25  # of them lie below the force in free air: on a soft surface the force rises long before it counts
+LOW_FRACTION = 0.25  # of them are below the force in free air: on a soft surface the force rises long before it counts
 AFTER = 5  # readings in the upper half of the lift
-MIN_RISE_M = 0.001  # a lift that was seen from less far below says nothing of free air
+MIN_RISE_M = 0.001  # a lift that was observed over a shorter distance does not show free air
 WAY_S = 0.15  # of commands that count as the way into an obstacle: no arm is later
 BACK_S = 0.3  # no way back takes longer
 HELPS_S = 0.09  # after which the force has begun to fall, if it ever will
-BACK_SPEEDS_M_S = (0.02, 0.1)  # the way back was free a moment ago: it may be gone as fast as it was come
+BACK_SPEEDS_M_S = (0.02, 0.1)  # the way back was free a moment ago: it may be as fast as the way there
 
 
 class ForceWatch:
@@ -126,7 +126,7 @@ class ForceWatch:
         self._lift: deque[tuple[float, float]] = deque(maxlen=BEFORE)  # height, m, and force, N
 
     def frozen(self, arm: ArmState, command: ArmCommand) -> str:
-        """Return in a sentence that the reading is frozen, '' if not; `command` is what the arm was doing."""
+        """Return in a sentence that the reading is frozen, '' if not; `command` is the present command."""
         if self._first is None or arm.force_n != self._first.force_n or self._holds(arm.force_n, command):
             self._first, self._repeats, self._newest_ns = arm, 0, arm.time_ns
             return ''
@@ -145,7 +145,7 @@ class ForceWatch:
         )
 
     def note(self, phase: Phase, arm: ArmState, command: ArmCommand) -> None:
-        """Take note of the force in free air, before the contact and after it."""
+        """Note the force in free air, before the contact and after it."""
         if phase is Phase.APPROACH:
             self._note_free(arm, command)
         elif phase is Phase.LIFT:
@@ -174,7 +174,7 @@ class ForceWatch:
     def _forces_above(self) -> list[float]:
         """Return the last forces in the upper half of the lift.
 
-        The finger still presses while it brakes, and a busy machine may see but few states of the lift itself.
+        The finger still presses while it brakes, and a busy machine may get only few states of the lift.
         """
         if not self._lift:
             return []
@@ -187,22 +187,22 @@ class ForceWatch:
     @property
     def _free_air_n(self) -> float:
         """The force without contact, as it was before the contact; 0 until it is known."""
-        return sorted(self._before)[int(LOW_SHARE * len(self._before))] if self._before else 0.0
+        return sorted(self._before)[int(LOW_FRACTION * len(self._before))] if self._before else 0.0
 
     def _implausible(self, force_n: float, moved_m: float) -> bool:
         return force_n - self._free_air_n >= CONTACT_N and moved_m >= FROZEN_TRAVEL_M
 
     def _holds(self, force_n: float, command: ArmCommand) -> bool:
-        """Return whether the arm keeps the force the same by itself."""
+        """Return whether the arm controls the force to a constant value."""
         if self._reading is not ForceReading.CONTROLLED:
             return False
         if command.force_n is None:
             return command.normal_m_s == 0.0
-        return abs(command.force_n - force_n) <= HELD_SHARE * command.force_n
+        return abs(command.force_n - force_n) <= HELD_FRACTION * command.force_n
 
 
 class ForceGuard:
-    """Limit the whole force, and find the way back out of what the finger has met.
+    """Limit the whole force, and find the way back from an obstacle.
 
     As long as the arm has not zeroed its force sensor, only the change since the start counts. The way back
     is that of the last commands: it needs neither the frame nor the sign of the force, nor those of the pose.
@@ -211,7 +211,7 @@ class ForceGuard:
     def __init__(self, limits: SafetyLimits) -> None:
         self.blocked = ''
         self._limits = limits
-        self._zero: Vector | None = None  # what the sensor shows at the start, while it is not zeroed
+        self._zero: Vector | None = None  # reading of the sensor at the start, while it is not zeroed
         self._way: deque[tuple[int, ArmCommand, float]] = deque()  # with the size of the force
         self._back: ArmCommand | None = None
         self._back_ns = 0
@@ -229,12 +229,12 @@ class ForceGuard:
         return replace(arm, force_n=z, along_n=(x, y))
 
     def violation(self, arm: ArmState, phase: Phase) -> str:
-        """Return in a sentence that a force is too high, '' if none is; a finger that is lifted may tear itself off."""
+        """Return in a sentence that a force is too high, '' if none is; a lifted finger may come off with a jerk."""
         excess = self._limits.force_violation(arm)
         return excess if excess or phase is Phase.LIFT else self._limits.friction_violation(arm)
 
     def yielding(self, arm: ArmState, command: ArmCommand, aborted: bool) -> ArmCommand:
-        """Return the command; or, after an abort, the way back as long as the finger is held."""
+        """Return the command; or, after an abort, the way back as long as the finger is blocked."""
         now_ns, size_n = arm.time_ns, arm.force_size_n
         held = bool(self._limits.force_violation(arm) or self._limits.friction_violation(arm))
         while self._way and now_ns - self._way[0][0] > WAY_S * 1e9:
@@ -256,12 +256,12 @@ class ForceGuard:
         if size_n > 0.5 * self._limits.tangential_floor_n and back_s < BACK_S and helps:
             return self._back
         if self._back.normal_m_s < 0.0:
-            self.blocked = 'the force grew while the finger rose; see that nothing is above it, and the surface pose'
+            self.blocked = 'the force increased while the finger rose; check the space above it and the surface pose'
         self._back = None
         return command
 
     def _way_back(self) -> ArmCommand | None:
-        """Return the opposite of the last commands; away from a surface that was pressed on."""
+        """Return the opposite of the last commands; off a surface in contact."""
         commands = [command for _, command, _ in self._way]
         x, y = (sum(command.tangential_m_s[axis] for command in commands) for axis in (0, 1))
         pressed = any(command.force_n is not None for command in commands)
@@ -276,12 +276,12 @@ class ForceGuard:
 
 
 # --------------------
-# Whether samples arrive while the finger moves: a slide without them measures nothing.
+# Whether samples arrive while the finger moves: a slide without them is useless.
 
 
 @dataclass(frozen=True)
 class SignalWatchParams:
-    """Parameters that end an exploration when the sensor falls silent."""
+    """Parameters of the supervision of the sensor samples."""
 
     watch_signal: bool = param(True, "Aborts an exploration when no samples arrive on the topics of 'signal_topics'.")
     signal_topics: str = param(
@@ -307,7 +307,7 @@ class SignalWatchParams:
 
 
 class SignalWatch:
-    """Remember when each stream came last; `on_samples` and `signal_fault` may be called from different threads."""
+    """Note the last arrival of each stream; `on_samples` and `signal_fault` may be called from different threads."""
 
     def __init__(self, timeout_s: float, clock: Callable[[], int], topics: Sequence[str] = ('signal',)) -> None:
         self._timeout_s = timeout_s
@@ -315,15 +315,15 @@ class SignalWatch:
         self._last_samples_ns = dict.fromkeys(topics, 0)
 
     def on_samples(self, topic: str = 'signal') -> None:
-        """Take note that samples have come."""
+        """Note the arrival of samples."""
         self._last_samples_ns[topic] = self._clock()
 
     def signal_fault(self, listening: Listening) -> str:
-        """Return in a sentence which streams are silent while the loop listens, '' if none is."""
+        """Return in a sentence which streams are silent while the loop runs, '' if none is."""
         now_ns = self._clock()
         ages_s = {topic: listening.silence_s(last, now_ns) for topic, last in self._last_samples_ns.items()}
         silent = {topic: age_s for topic, age_s in ages_s.items() if age_s > self._timeout_s}
         if not silent:
             return ''
         named = ' and '.join(f"'{topic}'" for topic in silent)
-        return f'no samples have come on {named} for {max(silent.values()) * 1e3:.0f} ms; check the sensor and its node'
+        return f'no samples on {named} for {max(silent.values()) * 1e3:.0f} ms; check the sensor and its node'

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Lift the finger before a motion begins: after a fault nobody knows whether it still presses.
+"""Lift the finger before a motion begins: after a fault the contact state is unknown.
 
-Nobody knows either whether frames and signs are what they are said to be, so that the lift begins with a probe, and is
+Frames and signs may also differ from the declared ones, so that the lift begins with a probe, and is
 slow and watched to its end.
 """
 
@@ -24,18 +24,18 @@ CALM_S = 0.15  # at rest; an arm that zeroes its force sensor does so now
 PROBE_M = 0.0005
 PROBE_M_S = 0.002
 PROBE_TIMEOUT_S = 2.0
-STILL_M, STILL_S = 0.00005, 0.06  # an arm that moves less in this time stands still
-ASTRAY_M = 0.0002  # beside the commanded way: more than noise and play
+STILL_M, STILL_S = 0.00005, 0.06  # an arm that moves less in this time is at rest
+ASTRAY_M = 0.0002  # off the commanded path: more than noise and play
 MET_GROWTH = 2.0  # times the change in the first half of the way
-MOST_FORCE_SHARE = 0.65  # of the force limit: no finger that was pressed as asked is left pressed harder
+MOST_FORCE_SHARE = 0.65  # of the force limit: no finger with a permitted force is left pressed harder
 GO_BACK_S = 0.5
 UNKNOWN_STATE = ArmState(0, (math.inf,) * 3, (0.0,) * 3, math.nan)
 REST_STEP_M = 1e-5  # way between two states of an arm at rest
-PATIENCE_S = 0.6  # an arm that has not zeroed its force sensor by then will not do so where it stands
+PATIENCE_S = 0.6  # an arm that has not zeroed its force sensor by then will not do so at this place
 
 
 class Detour(MotionAborted):
-    """What ends a stage is left by other stages, and the motion ends with them."""
+    """An end of a stage with other stages after it, which end the motion."""
 
     def __init__(self, reason: str, *stages: Stage, error: ExplorationError = ExplorationError.MOTION_FAILED) -> None:
         super().__init__(reason, error)
@@ -72,17 +72,17 @@ class Rise(Stage):
         self._first = UNKNOWN_STATE
         self._most_n = MOST_FORCE_SHARE * limits.force_limit_n
         self._impact_n = IMPACT * force_n
-        self._signed = signed  # the sign of the force is not known to be wrong
+        self._signed = signed  # no wrong sign of the force was found
         self._zero_n = zero_n  # from which the force counts: that before the first of several rises
         self._air = FreeAir(touch.clearance_m, touch.contact_force_n)
         self._start_ns: int | None = None  # of the probe
         self._rest_ns = 0
-        self._heights_m: list[float] = []  # of the way so far, and the forces there
+        self._heights_m: list[float] = []  # along the rise, and the forces there
         self._forces_n: list[Vector] = []
         self.free = False
 
     def again(self) -> Rise:
-        """Return a rise that comes after this one, whatever the sign of the force; it counts from the same zero."""
+        """Return a rise after this one, for any sign of the force; it counts from the same zero."""
         return Rise(*self._given, signed=False, zero_n=self._zero_n)
 
     def begin(self, time_ns: int, arm: ArmState) -> None:
@@ -101,7 +101,7 @@ class Rise(Stage):
         risen_m = arm.position[2] - self._first.position[2]
         if risen_m > self._longest_m:
             raise MotionAborted(
-                f'the force changed all the while the finger rose by {risen_m:.3f} m; see that nothing touches it, and '
+                f'the force changed while the finger rose by {risen_m:.3f} m; check that nothing touches it, and '
                 "raise 'contact_force_n' above the noise of the force sensor",
                 ExplorationError.FORCE_SENSOR,
             )
@@ -120,10 +120,10 @@ class Rise(Stage):
         return ArmCommand(normal_m_s=max(PROBE_M_S, min(self._speed_m_s, gentle_m_s)))
 
     def _rests(self, time_ns: int, arm: ArmState) -> bool:
-        """Wait until the arm stands still, as it may not do yet after a fault; note place and force."""
+        """Wait until the arm is at rest, which may take time after a fault; note place and force."""
         if self.elapsed_s(time_ns) > PROBE_TIMEOUT_S:
             raise MotionAborted(
-                'the arm moves although it was told to stand still; see who else moves it', ExplorationError.ARM_FAULT
+                'the arm moves although zero velocity is commanded; see what moves it', ExplorationError.ARM_FAULT
             )
         if math.dist(arm.position, self._first.position) > STILL_M:
             self._first, self._rest_ns = arm, time_ns
@@ -142,8 +142,8 @@ class Rise(Stage):
         if not astray and (up >= PROBE_M or (time_ns - self._start_ns) * 1e-9 < PROBE_TIMEOUT_S):
             return
         reason = (
-            f'the arm moved by ({1e3 * x:.2f}, {1e3 * y:.2f}, {1e3 * up:.2f}) mm in the frame of the surface where it '
-            'was told to rise along z; check the frame and the sign of its velocities'
+            f'the arm moved by ({1e3 * x:.2f}, {1e3 * y:.2f}, {1e3 * up:.2f}) mm in the frame of the surface although '
+            'a rise along z is commanded; check the frame and the sign of its velocities'
         )
         back = GoBack(self._first.force_vector_n, self._touch)
         raise Detour(reason, back) if astray else MotionAborted(reason)
@@ -159,7 +159,7 @@ class Rise(Stage):
             )
 
     def _watch_growth(self, arm: ArmState) -> float:
-        """Return the stiffness of what the finger leaves, N/m, 0 in the air; Detour if it meets something.
+        """Return the stiffness of the contact that the finger leaves, N/m, 0 in the air; Detour if it meets something.
 
         A surface that is left lets the force change less and less; what is met changes it more in the second half of
         the way than in the first.
@@ -173,8 +173,8 @@ class Rise(Stage):
         newly_n, before_n = math.dist(force_n, middle_n), math.dist(middle_n, self._forces_n[0])
         if height_m - self._heights_m[0] >= PROBE_M / 2 and newly_n > MET_GROWTH * before_n + noise_n:
             raise Detour(
-                f'the finger met something while it rose, the force changed by {newly_n:.2f} N; see what is above it, '
-                'and that the z axis of the surface points away from it',
+                f'the finger met something while it rose, the force changed by {newly_n:.2f} N; check what is above '
+                'it, and that the z axis of the surface points away from it',
                 GoBack(middle_n, self._touch),
             )
         last = max(0, bisect_right(self._heights_m, height_m - PROBE_M) - 1)
@@ -205,11 +205,11 @@ class GoBack(Stage):
 
 
 class CalmDown(Stage):
-    """Stand still, until the force sensor can be believed.
+    """Rest until the force sensor is valid.
 
-    An arm that proves free air by itself may have seen less of the lift than the explorer did, or its controller may
-    not have taken the command to zero. Standing still would prove nothing more, so that the finger rises again, as long
-    as the force stays what it was when it first stood.
+    An arm that detects free air may have observed less of the lift than the explorer, or its controller may
+    not have accepted the command to zero. More rest would prove nothing, so that the finger rises again, as long
+    as the force stays that of the first rest.
     """
 
     commands = ('rest', 'up')
@@ -236,7 +236,7 @@ class CalmDown(Stage):
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Wait; rise by the clearance whenever the arm has not zeroed its force sensor within `PATIENCE_S`."""
-        # A sensor that reads nothing at rest was zeroed, though the arm may not say so yet; a contact would be read
+        # A sensor that reads nothing at rest was zeroed, though the arm may not report it yet; a contact would be read
         before, self._before = self._before or arm, arm
         if (
             math.dist(before.position, arm.position) < REST_STEP_M
@@ -247,7 +247,7 @@ class CalmDown(Stage):
         if rested_s >= CALM_S and self._zeroed():
             if self._believed:
                 return None
-            self._believed = True  # the arm tells so at once, and this state may still be without the zero
+            self._believed = True  # the arm reports it at once, and this state may still be without the zero
             return ArmCommand()
         height_m = arm.position[2]
         if rested_s < PATIENCE_S or height_m - self._start_m > self._touch.approach_travel_m:
@@ -255,8 +255,8 @@ class CalmDown(Stage):
         met_n = math.dist(arm.force_vector_n, self._free_n)
         if met_n > self._touch.contact_force_n and not self._zeroed():
             raise Detour(
-                f'the finger met something while it rose for its force sensor to be zeroed, {met_n:.2f} N; see what is '
-                'above it, and that the z axis of the surface points away from it',
+                f'the finger met something while it rose for its force sensor to be zeroed, {met_n:.2f} N; check what '
+                'is above it, and that the z axis of the surface points away from it',
                 GoBack(self._free_n, self._touch),
             )
         if height_m - self._rest_m < self._touch.clearance_m:

@@ -31,10 +31,10 @@ from texture_exploration.touch import WALL_SHARE, TouchParams
 
 @dataclass(frozen=True)
 class MotionStep:
-    """What the arm shall do now, and how far the motion is.
+    """Command for the arm at this time, and progress of the motion.
 
-    `steady_s` guarantees that phase, speed and force hold so long from now; `direction_rad` is the direction of travel;
-    `progress` the share of the slide that is over.
+    `steady_s` guarantees phase, speed and force for this time from now on; `direction_rad` is the direction of travel;
+    `progress` the fraction of the slide that is over.
     """
 
     command: ArmCommand
@@ -45,13 +45,13 @@ class MotionStep:
 
 
 # --------------------
-# Go through the stages.
+# Sequence of the stages.
 
 
 class Motion:
     """One planned exploration: go through the stages; on any error go to the last one, which lifts the finger.
 
-    It knows no clock and no arm: it is stepped with the time and the state of the arm.
+    It reads no clock and no arm: each step gets the time and the state of the arm.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class Motion:
     Attributes
     ----------
     error
-        Why the motion itself aborted; NONE if it did not, or was told to.
+        Why the motion aborted; NONE if it did not, or was aborted from outside.
     """
 
     def __init__(self, stages: Sequence[Stage], slide: SlideStage) -> None:
@@ -85,7 +85,7 @@ class Motion:
         Parameters
         ----------
         zeroed
-            Whether the force sensor of the arm can be believed once it stands still in free air.
+            Whether the force sensor of the arm is valid once it is at rest in free air.
         zero_n
             What it shows before the first lift since the arm was connected; None: before this one.
         """
@@ -104,15 +104,15 @@ class Motion:
             raise MotionRefused(
                 f'{motion}: speed_m_s is {along.speed_m_s:g}; a wall of {stiffness_n_m:g} N/m '
                 f"('approach_stiffness_n_m') could press with more than {WALL_SHARE * limit_n:g} N, {WALL_SHARE:g} "
-                f"times 'force_limit_n', until an arm that is {1e3 * arm.delay_s:.0f} ms late stands; allowed is at "
-                f'most {math.floor(allowed_m_s * 1e4) / 1e4:g} m/s',
+                f"times 'force_limit_n', until an arm that is {1e3 * arm.delay_s:.0f} ms late has stopped; allowed is "
+                f'at most {math.floor(allowed_m_s * 1e4) / 1e4:g} m/s',
                 field='speed_m_s',
             )
 
     def step(self, time_ns: int, arm: ArmState) -> MotionStep:
         """Return what to do at `time_ns` (CLOCK_MONOTONIC), until the phase is DONE or ABORTED.
 
-        A stage that is over hands on to the next within the same step.
+        After the end of a stage the next one begins within the same step.
         """
         command = self._try_stage(time_ns, arm)
         while command is None and self._remaining_stages:
@@ -157,11 +157,11 @@ class Motion:
             self._slide.finish()
 
     def note_way_back(self) -> None:
-        """Take note that the finger went the way back out of an obstacle instead of what the last step commanded."""
+        """Note that the finger moved back from an obstacle instead of the last command."""
         self._lift.watch_anew()
 
     def lift_from(self, place: Vector) -> LiftStage:
-        """Return another lift from a place, for whoever cannot trust this motion any more."""
+        """Return another lift from a place, in case this motion has failed."""
         along, (x, y, z) = self._slide.along, place
         return LiftStage((x, y, z + along.touch.clearance_m), along.force_n, along.touch, along.limits)
 
@@ -172,17 +172,17 @@ class Motion:
 
     @property
     def lifted(self) -> bool:
-        """Whether the finger was lifted at the end, and the measured force says so."""
+        """Whether the finger was lifted at the end, confirmed by the measured force."""
         if self._ended_ahead:
             return self._free_ahead
         return bool(self._lift.free)
 
     @property
     def message(self) -> str:
-        """What happened, in one sentence."""
+        """The outcome in one sentence."""
         if self._ended_ahead and not self._free_ahead:
             return f'{self._abort_reason}; the finger was not lifted'
-        return self._abort_reason or self._finish_reason or 'the motion ended as asked'
+        return self._abort_reason or self._finish_reason or 'the motion was completed'
 
     def _try_stage(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Return the command of the present stage; None if it is over, cannot go on, or there is none."""
@@ -199,7 +199,7 @@ class Motion:
                 self._free_ahead = stage.free
 
     def _give_way(self, stage: Stage, error: MotionAborted) -> None:
-        """Go on in the way that the stage leaves: back, further up, by the lift, or stay where the finger is."""
+        """Continue as the stage allows: back, further up, by the lift, or stay in place."""
         reason, self.error = str(error), self.error or error.error
         if stage is self._lift:
             before = f'{self._abort_reason}; ' if self._abort_reason else ''
@@ -212,7 +212,7 @@ class Motion:
             self.abort(reason)
 
     def _end_ahead(self, reason: str, *stages: Stage) -> None:
-        """End after some stages; what follows does not begin."""
+        """End after some stages, without the following ones."""
         self._abort_reason = self._abort_reason or reason
         self._ended_ahead = True
         self._stage, self._remaining_stages = None, [*stages]

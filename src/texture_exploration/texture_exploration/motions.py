@@ -16,7 +16,7 @@ from texture_core.types import ExplorationRequest
 from texture_exploration.arms.arm import Vector
 from texture_exploration.motion import Motion, Planner
 from texture_exploration.paths import (
-    LEAST_SHARE,
+    LEAST_FRACTION,
     QUARTER_RAD,
     STEADY_S,
     CircularPath,
@@ -46,7 +46,7 @@ from texture_exploration.touch import TouchParams
 from texture_exploration.watches import ContactWatch
 
 # --------------------
-# The stages that every slide of a finger over a surface has, whatever its path.
+# The stages of every slide of a finger over a surface, on any path.
 
 
 def plan_surface_slide(
@@ -131,7 +131,7 @@ def _check_free_distance(request: ExplorationRequest, home: Vector, limits: Safe
 
 
 # --------------------
-# Rub a surface to and fro with a fingertip, as the free fingers of a hand do on what the others hold.
+# Rub to and fro with a fingertip, as the free fingers of a hand do on an object that the others hold.
 
 # A stroke is about what a fingertip reaches; duration: Kaboli et al. 2015.
 IN_HAND_SLIDING_DEFAULTS = {'speed_m_s': 0.02, 'force_n': 1.0, 'distance_m': 0.02, 'duration_s': 2.0}
@@ -140,7 +140,7 @@ IN_HAND_SLIDING_DEFAULTS = {'speed_m_s': 0.02, 'force_n': 1.0, 'distance_m': 0.0
 def in_hand_sliding(request: ExplorationRequest, home: Vector, touch: TouchParams, limits: SafetyLimits) -> Motion:
     """Plan strokes of `distance_m` to and fro, for `duration_s`.
 
-    Which fingers slide and which hold is the hand's business (`texture_exploration.arms.in_hand`).
+    Which fingers slide and which hold is up to the hand (`texture_exploration.arms.in_hand`).
     """
     return _plan(limits.complete(request, IN_HAND_SLIDING_DEFAULTS), home, touch, limits, ends=whole_strokes)
 
@@ -157,7 +157,7 @@ def in_hand_random(
     Parameters
     ----------
     request
-        What the operator asks for; 0 takes the default of a number.
+        Request of the operator; a number of 0 takes its default.
     home
         Place where the strokes begin, m, in the frame of the surface.
     touch
@@ -181,7 +181,7 @@ def in_hand_random(
     """
     drawn = partial(random_strokes, rng=rng or np.random.default_rng())
     return _plan(
-        limits.complete(request, IN_HAND_SLIDING_DEFAULTS), home, touch, limits, ends=drawn, least_share=LEAST_SHARE
+        limits.complete(request, IN_HAND_SLIDING_DEFAULTS), home, touch, limits, ends=drawn, least=LEAST_FRACTION
     )
 
 
@@ -192,12 +192,12 @@ def _plan(
     limits: SafetyLimits,
     *,
     ends: Callable[[float], StrokeEnds],
-    least_share: float = 1.0,
+    least: float = 1.0,
 ) -> Motion:
-    """Plan strokes of a complete request; the shortest is `least_share` of the longest."""
+    """Plan strokes of a complete request; the shortest is `least` of the longest."""
     speed = request.speed_m_s
     turn_s = touch.ramp_s(2 * speed)
-    least_m = (ramps_m(speed, touch.ramp_s(speed)) + speed * turn_s) / least_share
+    least_m = (ramps_m(speed, touch.ramp_s(speed)) + speed * turn_s) / least
     _check_stroke(request, home, limits, least_m)
     strokes = Strokes(request.direction_rad, ends(request.distance_m), speed, turn_s, speed * request.duration_s)
     return plan_surface_slide(strokes, request, home, touch, limits)
@@ -241,8 +241,8 @@ def _check_linear_free_distance(
     if distance_m > allowed:
         allowed = min(allowed, MAX_DISTANCE_M)
         raise MotionRefused(
-            f'{request.motion}: distance_m is {stated(given, distance_m)}, which with {ramps:.3f} m to gain and lose '
-            f'speed leaves the workspace; allowed in this direction is at most {math.floor(allowed * 1000) / 1000:g} m '
+            f'{request.motion}: distance_m is {stated(given, distance_m)}, which with {ramps:.3f} m for the ramps '
+            f'leaves the workspace; allowed in this direction is at most {math.floor(allowed * 1000) / 1000:g} m '
             f'{limits.limits_ahead(home, request.direction_rad)}',
             ExplorationError.OUTSIDE_WORKSPACE,
             'distance_m',
@@ -266,7 +266,7 @@ def cross_slide(request: ExplorationRequest, home: Vector, touch: TouchParams, l
     Parameters
     ----------
     request
-        What the operator asks for; 0 takes the default of a number.
+        Request of the operator; a number of 0 takes its default.
     home
         Place where the first slide begins, m, in the frame of the surface.
     touch
@@ -286,17 +286,17 @@ def cross_slide(request: ExplorationRequest, home: Vector, touch: TouchParams, l
     """
     request = limits.complete(request, CROSS_SLIDE_DEFAULTS)
     speed = request.speed_m_s
-    corner_s = touch.ramp_s(QUARTER_RAD * speed)  # the arc of a quarter turn is as steep as a ramp of so much
+    corner_s = touch.ramp_s(QUARTER_RAD * speed)  # the arc of a quarter turn is as steep as a ramp of this speed
     _check_legs(request, home, limits, ramps_m(speed, touch.ramp_s(speed)) + speed * (corner_s + STEADY_S))
     legs = CrossLegs(request.direction_rad, request.distance_m, speed, corner_s, touch.arm_lag_s)
     return plan_surface_slide(legs, request, home, touch, limits)
 
 
-def _check_legs(request: ExplorationRequest, home: Vector, limits: SafetyLimits, beside_m: float) -> None:
-    """Refuse legs that leave the workspace; `beside_m` is the way beside a leg, for the ramps and the corner."""
+def _check_legs(request: ExplorationRequest, home: Vector, limits: SafetyLimits, extra_m: float) -> None:
+    """Refuse legs that leave the workspace; `extra_m` is the distance for the ramps and the corner."""
 
     def fits(distance_m: float) -> bool:
-        direction, reach_m = request.direction_rad, distance_m + beside_m
+        direction, reach_m = request.direction_rad, distance_m + extra_m
         corner = (home[0] + reach_m * math.cos(direction), home[1] + reach_m * math.sin(direction), home[2])
         return (
             limits.free_distance_m(home, direction) >= reach_m
@@ -311,7 +311,7 @@ def _check_legs(request: ExplorationRequest, home: Vector, limits: SafetyLimits,
         low, high = (middle, high) if fits(middle) else (low, middle)
     raise MotionRefused(
         f'{request.motion}: distance_m, the length of each of two legs, is {request.distance_m:g}, which with '
-        f'{beside_m:.3f} m for the ramps and the corner leaves the workspace; allowed in this direction is at most '
+        f'{extra_m:.3f} m for the ramps and the corner leaves the workspace; allowed in this direction is at most '
         f'{math.floor(low * 1000) / 1000:g} m '
         f'{limits.limits_ahead(home, request.direction_rad, request.direction_rad + QUARTER_RAD)}',
         ExplorationError.OUTSIDE_WORKSPACE,
@@ -330,7 +330,7 @@ MOTIONS: Mapping[str, Planner] = {
     'in_hand_random': in_hand_random,  # its future work: random exploratory movements
 }
 
-# The numbers that each motion takes, with what is meant when one is not given: what the dashboard offers.
+# The numbers that each motion takes, with their defaults: the form of the dashboard.
 DEFAULTS: Mapping[str, Mapping[str, float]] = {
     'linear_slide': LINEAR_SLIDE_DEFAULTS,
     'circular': CIRCULAR_DEFAULTS,

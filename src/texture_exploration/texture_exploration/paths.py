@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Where a finger goes on the surface: paths, who steers along them, and ramps of the speed."""
+"""Paths of a finger on the surface, followers of paths, and speed ramps."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ import numpy as np
 from texture_exploration.arms.arm import ArmState
 
 # --------------------
-# A path along the surface, how far the finger is on it, and how speed is gained and lost.
+# A path along the surface, the progress of the finger on it, and speed ramps.
 
 MIN_RAMP_S = 0.1  # even a slow slide starts softly
-STEADY_S = 0.05  # at full speed before it counts as sliding: the arm lags behind, the skin still swings
+STEADY_S = 0.05  # at full speed before it counts as sliding: the arm lags, the skin still oscillates
 HALF_STEP_S = 0.005  # a command holds for one step of the exploration: its middle counts
 STEERING_1_S = 15.0  # sideways speed per distance from the path; a tenth of what would be too much for a lag of 20 ms
-MAX_SIDEWAYS = 0.5  # share of the speed
+MAX_SIDEWAYS = 0.5  # fraction of the speed
 TURN_MARGIN_S = 0.01  # steady speed is guaranteed from one step after a turn until one step before the next
 
 
@@ -38,7 +38,7 @@ class SurfacePath(Protocol):
 
 
 class Follower(Protocol):
-    """Whoever steers the finger; the stages of a slide ask it where to go."""
+    """Steers the finger along the surface, for the stages of a slide."""
 
     length_m: float  # of the part at constant speed
     travelled_m: float
@@ -52,10 +52,10 @@ class Follower(Protocol):
         """How far from here speed and force can be kept."""
 
     def begin_slide(self) -> None:
-        """The slide begins here; what came before was for gaining speed."""
+        """Mark the start of the slide after the ramp."""
 
     def update(self, time_ns: int, arm: ArmState) -> None:
-        """Take note of where the finger is."""
+        """Update the position of the finger."""
 
     def velocity(self, speed_m_s: float) -> tuple[float, float]:
         """Return the velocity to command for a speed, m/s."""
@@ -65,7 +65,7 @@ class PathFollower:
     """Keep track of how far the finger has travelled on a path, and steer it along.
 
     The direction is that of the path where the finger will be in the middle of the next step: age of the state, lag
-    of the arm and half a step ahead. What is left of the distance to the path is steered off at constant speed.
+    of the arm and half a step ahead. The remaining distance to the path is corrected at constant speed.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ class PathFollower:
         return self.path.direction_rad(self.travelled_m)
 
     def begin_slide(self) -> None:
-        """One path serves the ramp and the slide: there is nothing to change."""
+        """Change nothing: one path serves the ramp and the slide."""
 
     def update(self, time_ns: int, arm: ArmState) -> None:
         """Project the finger on the path: so noise of the position does not add up."""
@@ -122,9 +122,9 @@ class PathFollower:
         return x * cos + y * sin, y * cos - x * sin
 
 
-def smooth(share: float) -> float:
-    """Return a cosine rise from 0 to 1 as `share` goes from 0 to 1: no step in speed, no jolt in acceleration."""
-    return 0.5 - 0.5 * math.cos(math.pi * min(1.0, max(0.0, share)))
+def smooth(fraction: float) -> float:
+    """Return a cosine rise from 0 to 1 for `fraction` from 0 to 1: no step in speed, limited jerk."""
+    return 0.5 - 0.5 * math.cos(math.pi * min(1.0, max(0.0, fraction)))
 
 
 def ramp_s(speed_m_s: float, acceleration_m_s2: float, jerk_m_s3: float = math.inf) -> float:
@@ -138,12 +138,12 @@ def ramp_s(speed_m_s: float, acceleration_m_s2: float, jerk_m_s3: float = math.i
 
 
 def lead_m(speed_m_s: float, gaining_s: float) -> float:
-    """Return the way before the slide itself: to gain speed, at half of it in the mean, and to get steady."""
+    """Return the distance before the slide: to gain speed, at half of it in the mean, and to become steady."""
     return speed_m_s * (0.5 * gaining_s + STEADY_S)
 
 
 def ramps_m(speed_m_s: float, gaining_s: float) -> float:
-    """Return the way needed beside the slide itself: to gain speed, to get steady and to lose speed again."""
+    """Return the distance before and after the slide: to gain speed, to become steady and to lose speed."""
     return lead_m(speed_m_s, gaining_s) + 0.5 * speed_m_s * gaining_s
 
 
@@ -200,7 +200,7 @@ class CircularPath(NamedTuple):
 # --------------------
 # To and fro on a line, as a fingertip rubs.
 
-LEAST_SHARE = 0.5  # of the longest stroke: a random stroke is at least so long
+LEAST_FRACTION = 0.5  # of the longest stroke: the shortest random stroke
 # (whether the next stroke goes forth, where it begins, m) -> where it ends, m
 StrokeEnds = Callable[[bool, float], float]
 
@@ -212,7 +212,7 @@ def whole_strokes(stroke_m: float) -> StrokeEnds:
 
 def random_strokes(longest_m: float, rng: np.random.Generator) -> StrokeEnds:
     """Return ends that are drawn at each turn: strokes of at least half of the longest, within 0 to `longest_m`."""
-    least_m = LEAST_SHARE * longest_m
+    least_m = LEAST_FRACTION * longest_m
 
     def end_of(forth: bool, begin_m: float) -> float:
         low, high = (begin_m + least_m, longest_m) if forth else (0.0, begin_m - least_m)
@@ -225,7 +225,7 @@ class Strokes:
     """Steer a finger to and fro on a line; a `Follower`.
 
     A turn follows a cosine from full speed one way to full speed the other way, so the finger neither stops with a jolt
-    nor rests. Arms follow late: when the finger is seen to move the other way, half of its own turn is still to come,
+    nor rests. Arms follow late: when the finger is seen to move the other way, half of its turn is still to come,
     and nothing is guaranteed until that is over.
     """
 
@@ -236,7 +236,7 @@ class Strokes:
         self._speed_m_s = speed_m_s
         self._turn_s = turn_s
         self._ends = ends
-        self._runs_on_m = speed_m_s * turn_s / math.pi  # until it stands: the integral of the cosine over half a turn
+        self._runs_on_m = speed_m_s * turn_s / math.pi  # until it stops: the integral of the cosine over half a turn
         self._forth = True
         self._end_m = ends(True, 0.0)
         self._along_m = self._age_m = 0.0
@@ -259,10 +259,10 @@ class Strokes:
         return max(0.0, self._left_m - self._age_m - TURN_MARGIN_S * self._speed_m_s)
 
     def begin_slide(self) -> None:
-        """Strokes go on as they are: there is nothing to change."""
+        """Change nothing: the strokes continue."""
 
     def update(self, time_ns: int, arm: ArmState) -> None:
-        """Take note of where the finger is, and turn at the end of the stroke."""
+        """Update the position of the finger, and turn at the end of the stroke."""
         x, y, _ = arm.position
         if self._origin is None:
             self._origin, self._time_ns = (x, y), time_ns
@@ -347,7 +347,7 @@ class CrossLegs:
         return 0.0 if self._left_corner_s > 0.0 else math.inf
 
     def update(self, time_ns: int, arm: ArmState) -> None:
-        """Take note of where the finger is, and enter the corner at the end of the first leg."""
+        """Update the position of the finger, and enter the corner at the end of the first leg."""
         passed_s = (time_ns - self._time_ns) * 1e-9
         self._time_ns = time_ns
         self._age_m = self._speed_m_s * max(0.0, (time_ns - arm.time_ns) * 1e-9)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""A preset: the motions of a paper or of your own, as a list of requests from one YAML file.
+"""A preset: the motions of a paper or of a user, as a list of requests from one YAML file.
 
 paper: where the numbers come from
 motion: linear_slide
@@ -30,7 +30,7 @@ SHORTHANDS = ('direction_deg', 'slide_s')
 
 
 class Preset(NamedTuple):
-    """What a preset file says."""
+    """Content of a preset file."""
 
     name: str
     paper: str
@@ -38,7 +38,7 @@ class Preset(NamedTuple):
     repeats: int
 
     def all(self, repeats: int = 0) -> list[ExplorationRequest]:
-        """Return all requests in turn, each combination once per round; `repeats` of 0 means the preset's own."""
+        """Return all requests in turn, each combination once per round; `repeats` of 0 means that of the preset."""
         return list(self.requests) * (repeats or self.repeats)
 
 
@@ -52,7 +52,7 @@ def load_preset(name_or_path: str) -> Preset:
 
 
 def read_preset(content: Mapping[str, Any], name: str) -> Preset:
-    """Return the preset in what a preset file holds; raises as `load_preset`."""
+    """Return the preset in the content of a file; raises as `load_preset`."""
     where = f"preset '{name}'"
     vary = content.get('vary', {})
     if not isinstance(vary, Mapping):
@@ -88,7 +88,7 @@ def _request(motion: str, numbers: Mapping[str, Any], where: str) -> Exploration
         values['direction_rad'] = math.radians(numbers['direction_deg'])
     if 'slide_s' in numbers:
         if 'speed_m_s' not in values:
-            raise InvalidParameter(f"{where}: 'slide_s' needs 'speed_m_s', to tell how far to slide")
+            raise InvalidParameter(f"{where}: 'slide_s' needs 'speed_m_s', from which the distance follows")
         values['distance_m'] = values['speed_m_s'] * numbers['slide_s']
     return ExplorationRequest(motion, use_start=bool({'start_x_m', 'start_y_m'} & values.keys()), **values)
 

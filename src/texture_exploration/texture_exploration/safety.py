@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What may be asked for, of an exploration and by a single command, and what ends it at once: all limits of force."""
+"""Limits of requests, of single commands, and of measured forces and positions."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from texture_core.types import ExplorationRequest
 from texture_exploration.arms.arm import ArmCommand, ArmState, Vector
 
 # --------------------
-# What may be asked for and measured.
+# Limits of requests and measurements.
 
 MOST_FORCE_N = 1e4  # no sensor measures more
 MOST_M = 100.0  # of a place, and of a speed in m/s: no arm has more
 
 
 MAX_DISTANCE_M = 1.0
-# What can be asked for: lowest, highest and unit. A number is the same for every robot; a name is a limit to be chosen.
+# Range of a request: lowest, highest and unit. A number is the same for every robot; a name is a configurable limit.
 RANGES: Mapping[str, tuple[float | str, float | str, str]] = {
     'speed_m_s': (0.002, 'max_speed_m_s', 'm/s'),
     'force_n': ('min_force_n', 'max_force_n', 'N'),
@@ -31,17 +31,17 @@ RANGES: Mapping[str, tuple[float | str, float | str, str]] = {
     'turns': (0.1, 100.0, 'turns'),
     'duration_s': (0.1, 60.0, 's'),
 }
-# Several turns are a direction, too; an angle beyond this one is a mistake, and loses its meaning by rounding.
+# Several turns are also a direction; an angle beyond this one is a mistake, and loses precision by rounding.
 MAX_DIRECTION_RAD = 100.0
 
 
 def shown(force_n: float) -> str:
-    """Return a force in few characters, whatever it is."""
+    """Return a force of any size in few characters."""
     return f'{force_n:.2f}' if abs(force_n) <= MOST_FORCE_N else f'{force_n:.3g}'
 
 
 def stated(given: float, value: float) -> str:
-    """Return a number of a request in words; a `given` of 0 stands for the default of the motion."""
+    """Return a number of a request as text; a `given` of 0 means the default of the motion."""
     return f'{value:g}' if given else f'{value:g} (the default of the motion)'
 
 
@@ -53,7 +53,7 @@ def _edge(value: float, which: str) -> Any:
 
 @dataclass(frozen=True)
 class SafetyLimits:
-    """Limits of what is asked, of what is measured, and of how long each phase may take."""
+    """Limits of requests, of measurements and of the duration of each phase."""
 
     max_speed_m_s: float = param(
         0.25,
@@ -185,7 +185,7 @@ class SafetyLimits:
 
     @staticmethod
     def refuse_unused(request: ExplorationRequest, names: Iterable[str]) -> None:
-        """Refuse a request that gives a number which the motion does not know: it means another motion.
+        """Refuse a request with a number that the motion does not use: it means another motion.
 
         Raises
         ------
@@ -195,7 +195,7 @@ class SafetyLimits:
         given = sorted(name for name in names if getattr(request, name) != 0.0)
         if given:
             raise MotionRefused(
-                f'{request.motion} knows no {" and no ".join(given)}; leave it at 0',
+                f'{request.motion} does not use {" and ".join(given)}; leave it at 0',
                 ExplorationError.UNUSED_FIELD,
                 given[0],
             )
@@ -205,10 +205,10 @@ class SafetyLimits:
         return max(0.0, self._nearest_limit(start, direction_rad)[0])
 
     def limits_ahead(self, start: Vector, *directions_rad: float) -> str:
-        """Return in words where the finger starts and which limits it meets first in these directions."""
+        """Return as text the start of the finger and the limits that it meets first in these directions."""
         names = [self._nearest_limit(start, direction_rad)[1] for direction_rad in directions_rad]
-        told = ' and '.join(f"'{name}' is {getattr(self, name):g} m" for name in dict.fromkeys(names))
-        return f'from x {start[0]:.3f} and y {start[1]:.3f} m, as {told}'
+        declared = ' and '.join(f"'{name}' is {getattr(self, name):g} m" for name in dict.fromkeys(names))
+        return f'from x {start[0]:.3f} and y {start[1]:.3f} m, as {declared}'
 
     def _nearest_limit(self, start: Vector, direction_rad: float) -> tuple[float, str]:
         steps = (math.cos(direction_rad), math.sin(direction_rad))
@@ -220,7 +220,7 @@ class SafetyLimits:
 
     def force_violation(self, arm: ArmState) -> str:
         """Return in a sentence that the force is too high, or that it or the place is unknown; '' if not."""
-        # Written so that NaN is too much too.
+        # Written so that NaN also exceeds the limit.
         if not arm.force_n <= self.force_limit_n:
             return f'the force of {shown(arm.force_n)} N is above the limit of {self.force_limit_n:g} N'
         if arm.force_n < -self.force_limit_n:
@@ -237,13 +237,13 @@ class SafetyLimits:
         return ''
 
     def friction_violation(self, arm: ArmState) -> str:
-        """Return in a sentence that more than friction holds the finger along the surface, '' if not."""
+        """Return in a sentence that the force along the surface exceeds friction, '' if not."""
         x, y, normal_n = arm.force_vector_n
         most_n = self.friction_limit * abs(normal_n) + self.tangential_floor_n
         if math.hypot(x, y) <= most_n:
             return ''
         return (
-            f'the force along the surface of {math.hypot(x, y):.2f} N is more than friction can be, {most_n:.2f} N '
+            f'the force along the surface of {math.hypot(x, y):.2f} N is more than friction allows, {most_n:.2f} N '
             f'under {normal_n:.2f} N: the finger met something, or its force is given in another frame; see '
             "'friction_limit' and 'tangential_floor_n'"
         )
@@ -254,7 +254,7 @@ class SafetyLimits:
         return f'the finger left the workspace: {outside}' if outside else ''
 
     def outside(self, position: Vector) -> str:
-        """Return in words along which axes a position in the surface frame, m, lies outside the workspace, or ''."""
+        """Return as text along which axes a position in the surface frame, m, is outside the workspace, or ''."""
         return ' and '.join(
             f'{axis} is {at:.4f} m, allowed is {low:g} to {high:g} m'
             for at, (axis, (low, high)) in zip(position, self.workspace.items(), strict=True)
@@ -263,23 +263,23 @@ class SafetyLimits:
 
 
 # --------------------
-# What an arm or a hand does not carry out, whoever commands it.
+# Commands that an arm or a hand refuses from any program.
 
 
 @dataclass(frozen=True)
 class CommandLimits:
     """Limits of every single command; a base of the parameters of each arm.
 
-    The explorer has tighter limits of its own for what may be asked for. These hold also for programs that use an arm
+    The explorer has tighter limits for requests. These also hold for programs that use an arm
     without the explorer, and for a motion with an error in its arithmetic.
     """
 
-    command_speed_m_s = 1.0  # along the surface, of a single command; four times what an exploration may ask for
+    command_speed_m_s = 1.0  # along the surface, of a single command; four times the limit of an exploration
     command_normal_m_s = 0.5  # along the normal, of a single command
-    command_force_n = 50.0  # of a single command; what an exploration may ask for is at most as much
+    command_force_n = 50.0  # of a single command; the limit of an exploration is not higher
 
     def check(self, command: ArmCommand, stop: Callable[[], None] | None = None) -> None:
-        """Return if the command may be carried out."""
+        """Return if the command may be executed."""
         reason = self._excess(command)
         if not reason:
             return
@@ -288,7 +288,7 @@ class CommandLimits:
         raise CommandRefused(f'the command was refused and the arm stopped: {reason}')
 
     def _excess(self, command: ArmCommand) -> str:
-        # Written so that NaN is too much too.
+        # Written so that NaN also exceeds the limit.
         speed = math.hypot(*command.tangential_m_s)
         if not speed <= self.command_speed_m_s:
             return _range('the speed along the surface', speed, 0.0, self.command_speed_m_s, 'm/s')
@@ -305,7 +305,7 @@ def _range(what: str, value: float, low: float, high: float, unit: str) -> str:
 
 
 # --------------------
-# The part of the surface on which an exploration may be told to begin.
+# The part of the surface on which an exploration with a start may begin.
 
 
 def _patch_edge(which: str) -> Any:
@@ -339,7 +339,7 @@ class SurfacePatch:
             ('start_y_m', max(limits.y_low_m, self.patch_y_low_m), min(limits.y_high_m, self.patch_y_high_m)),
         ):
             at = getattr(request, name)
-            if not low <= at <= high:  # so NaN is off, too
+            if not low <= at <= high:  # so NaN is also off
                 raise MotionRefused(
                     f'{request.motion}: {name} is {at:g}, off the surface patch; allowed is {low:g} to {high:g} m',
                     ExplorationError.OUTSIDE_WORKSPACE,
@@ -363,7 +363,7 @@ class SurfacePatch:
 
 
 class Limit(NamedTuple):
-    """What is limited, by which value, who checks it, how fast, and what follows."""
+    """One limit: quantity, value, checking part, reaction time and consequence."""
 
     name: str
     quantity: str

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The stages of which motions are made: touch, press, slide, lift; each knows what to command and when it is over."""
+"""The stages of motions: touch, press, slide, lift; each has its commands and its end."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from texture_exploration.watches import ContactLost, ContactWatch, OvershootWatc
 
 NEAR_M = 0.0005
 GROWTH_M = 0.002
-LEAST_LIFT_M_S = 0.005  # a lift that nothing has proven yet ends in time too
-PRESSING_S = 0.1  # from contact to the wanted force: a step would swing on a stiff surface
+LEAST_LIFT_M_S = 0.005  # a lift without proof of free air also ends in time
+PRESSING_S = 0.1  # from contact to the wanted force: a step would oscillate on a stiff surface
 STEADY_HORIZON_S = 0.1  # the longest time for which a slide guarantees speed and force; ending it early takes as long
 
 
 class Stage:
     """One part of a motion.
 
-    `ahead`: it lifts before the motion begins. `stays`: after an error of its own the finger stays where it is, as no
+    `ahead`: it lifts before the motion begins. `stays`: after an error of the stage the finger stays in place, as no
     direction is known to help. `free`: whether it found the finger free, None if it did not look.
     """
 
@@ -53,17 +53,17 @@ class Stage:
         return (time_ns - self._begin_ns) * 1e-9
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
-        """Return what to do now, None when the stage is over; MotionAborted if its goal cannot be reached."""
+        """Return the command, None when the stage is over; MotionAborted if its goal cannot be reached."""
         raise NotImplementedError
 
     def see(self, arm: ArmState) -> None:
-        """Take note of a state after the end."""
+        """Note a state after the end."""
 
     def watch_anew(self) -> None:
-        """Forget the forces so far: others than this stage commanded the arm."""
+        """Discard the forces until now: another part commanded the arm."""
 
     def timed_step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
-        """Return what to do now; MotionAborted also if the stage takes too long."""
+        """Return the command; MotionAborted also if the stage takes too long."""
         command = self.step(time_ns, arm)
         if command is not None and self.elapsed_s(time_ns) > self.timeout_s:
             raise MotionAborted(f'waited {self.timeout_s:.1f} s for {self.goal}; the force is {arm.force_n:.2f} N')
@@ -85,7 +85,7 @@ class GoHomeStage(Stage):
         self._free_n: Vector | None = None
 
     def begin(self, time_ns: int, arm: ArmState) -> None:
-        """Allow the time that the way needs."""
+        """Allow the time for the distance."""
         super().begin(time_ns, arm)
         self._speed_m_s = self._touch.travel_m_s(self._limits.force_limit_n, arm.delay_s)
         self.timeout_s = self._limits.approach_timeout_s + math.dist(self._home, arm.position) / self._speed_m_s
@@ -141,17 +141,17 @@ class ApproachStage(Stage):
             )
         speed_m_s = self._touch.approach_m_s(self._force_n, arm.watchdog_s, arm.delay_s)
         if arm.watchdog_s:
-            # The same way may be gone, however much slower the arm has to be.
+            # The same distance is allowed, however slow the arm has to be.
             heard_m_s = self._touch.approach_m_s(self._force_n, delay_s=arm.delay_s)
             self.timeout_s = self._limits.approach_timeout_s * heard_m_s / speed_m_s
             self.goal = (
-                f'the finger to meet the surface at {speed_m_s * 1e3:.2g} mm/s, as the arm goes on for '
-                f'{arm.watchdog_s * 1e3:.0f} ms when it hears nothing'
+                f'the finger to meet the surface at {speed_m_s * 1e3:.2g} mm/s, as the arm continues for '
+                f'{arm.watchdog_s * 1e3:.0f} ms without a command'
             )
         return ArmCommand(normal_m_s=-speed_m_s)
 
     def _check_normal(self, arm: ArmState) -> None:
-        """Raise MotionAborted if what the finger met does not push it up: pressing harder would not end."""
+        """Raise MotionAborted if the contact does not push the finger up: the force would grow without limit."""
         x, y, z = arm.force_vector_n
         if z * math.hypot(1.0, self._limits.friction_limit) >= arm.force_size_n:
             return
@@ -162,7 +162,7 @@ class ApproachStage(Stage):
             )
         raise MotionAborted(
             f'the finger met something from the side as it came down, {what}; if there is nothing, the force is given '
-            'in another frame than its name says'
+            'in another frame than the declared one'
         )
 
 
@@ -198,7 +198,7 @@ class SettleForceStage(Stage):
 
 
 class Along(NamedTuple):
-    """What the stages along a path share: who steers, how fast, how hard, and who watches the contact."""
+    """Common parts of the stages along a path: follower, speed, force and the watch of the contact."""
 
     follower: Follower
     speed_m_s: float
@@ -214,7 +214,7 @@ class Along(NamedTuple):
 
 
 class AccelerateStage(Stage):
-    """Gain speed smoothly along the path; over when the arm really has the speed and the force."""
+    """Gain speed smoothly along the path; over when the arm has reached speed and force."""
 
     commands = ('press',)
     ends = 'speed and force are reached'
@@ -279,7 +279,7 @@ class SlideStage(Stage):
         self._finish = True
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
-        """Keep on sliding, and update the guaranteed time: 0 while the finger does not touch, or not as asked."""
+        """Keep on sliding, and update the guaranteed time: 0 without contact, or off the requested speed and force."""
         self.along.follower.update(time_ns, arm)
         self.steady_s = 0.0
         self.along.contact.update(arm)
@@ -308,9 +308,9 @@ class SlideStage(Stage):
 
 
 class BrakeStage(Stage):
-    """Lose speed smoothly along the path, still pressing: a finger that lifts at speed is plucked off.
+    """Lose speed smoothly along the path, still pressing: a finger that lifts at speed comes off with a jerk.
 
-    The slide itself is over: a surface that ends here costs nothing, and the finger only keeps its height. A contact
+    The slide is over: a surface may end here, and the finger only keeps its height. A contact
     that was lost in the slide and does not come back aborts.
     """
 
@@ -331,12 +331,12 @@ class BrakeStage(Stage):
         """Follow the ramp down."""
         self._along.follower.update(time_ns, arm)
         touching = self._touches(arm)
-        share = self.elapsed_s(time_ns) / self._along.ramp_s
-        if share >= 1.0:
+        fraction = self.elapsed_s(time_ns) / self._along.ramp_s
+        if fraction >= 1.0:
             if not self._whole:
                 self._along.contact.refuse()
             return None
-        velocity = self._along.follower.velocity(self._along.speed_m_s * smooth(1.0 - share))
+        velocity = self._along.follower.velocity(self._along.speed_m_s * smooth(1.0 - fraction))
         return ArmCommand(velocity, force_n=self._along.force_n if touching else None)
 
     def _touches(self, arm: ArmState) -> bool:
@@ -354,7 +354,7 @@ class LiftStage(Stage):
 
     The clearance counts from where the finger came free: a soft surface follows it for a while. A force that does not
     fall, as that of a frozen sensor, does not lift the finger beyond `approach_travel_m`. It goes no faster than it
-    came down until the force has fallen: only that proves that up is up.
+    came down until the force has fallen: only that proves the direction of the normal.
     """
 
     commands = ('up',)
@@ -393,24 +393,24 @@ class LiftStage(Stage):
         return ArmCommand(normal_m_s=self._touch.lift_speed_m_s if self._proven else self._gentle_m_s)
 
     def watch_anew(self) -> None:
-        """Watch the force from here on: what it did on the way back out of an obstacle says nothing of the rise."""
+        """Watch the force from here on: that on the way back from an obstacle is no part of the rise."""
         self._lowest_m = math.inf
 
     def see(self, arm: ArmState) -> None:
-        """Take note of the force, also after the lift."""
+        """Note the force, also after the lift."""
         self.free = arm.force_size_n <= self._touch.contact_force_n
 
     def _watch_rise(self, arm: ArmState) -> None:
-        """See whether the force falls from what it was at the lowest place: a late arm goes on down for a while."""
+        """Check whether the force falls from that at the lowest place: a late arm continues downwards for a while."""
         height_m, force_n = arm.position[2], arm.force_size_n
         if height_m <= self._lowest_m:
             self._lowest_m, self._lowest_n = height_m, force_n
-        if height_m <= self._lowest_m or height_m - self._newly[0] > GROWTH_M:  # what grows more slowly is drift
+        if height_m <= self._lowest_m or height_m - self._newly[0] > GROWTH_M:  # a slower increase is drift
             self._newly = height_m, force_n
         self._proven |= force_n < self._lowest_n - self._touch.contact_force_n
         grown_n = force_n - self._newly[1]
         if height_m - self._lowest_m > NEAR_M and grown_n > self._growth_n and not self._proven:
             raise MotionAborted(
-                f'the force grew from {self._newly[1]:.2f} to {force_n:.2f} N while the finger rose; see that nothing '
-                'is above it, the pose of the surface and the frame of the force'
+                f'the force grew from {self._newly[1]:.2f} to {force_n:.2f} N while the finger rose; check that '
+                'nothing is above it, the pose of the surface and the frame of the force'
             )

@@ -15,7 +15,7 @@ from texture_core.types import Array, rotation_vector
 from texture_exploration.safety import SurfacePatch
 
 MAKE_A_PLANE = 3
-TOUCHES = 4  # three always lie in a plane: only a further one shows whether it is the surface
+TOUCHES = 4  # three are always in a plane: only a further one verifies it
 NARROWEST_M = 0.01  # spread of the touches across their longest direction, and distance between any two
 LARGEST_RESIDUAL_M = 0.002  # a surface that is bent more than this is no plane
 EDGES = (np.min, np.max)
@@ -25,8 +25,8 @@ LARGEST_TURN_RAD = math.radians(15.0)  # against the pose before: beyond, a touc
 class SurfaceFit(NamedTuple):
     """A plane through touches: `pose` as `SurfaceFrame` takes it, (6,); distances of the touches from the plane in m.
 
-    `residual_m` is their root mean square and `largest_m` the largest; both are 0 for three touches, which always lie
-    in one plane and so prove nothing.
+    `residual_m` is their root mean square and `largest_m` the largest; both are 0 for three touches, which are always
+    in one plane and verify nothing.
     """
 
     pose: tuple[float, ...]
@@ -40,7 +40,7 @@ def fit_surface(
 ) -> SurfaceFit:
     """Return the plane that fits touches best, by least squares of the distances (total least squares).
 
-    The origin is the middle of the touches, z the normal, x the direction `along` the surface as far as it lies in the
+    The origin is the middle of the touches, z the normal, x the direction `along` the surface, projected on the
     plane.
     """
     points = np.array(touches, dtype=float)
@@ -82,7 +82,7 @@ def fit_surface(
 
 
 class SurfaceTouches:
-    """Collects touches until they make a plane that one more confirms; further ones refine it."""
+    """Collects touches until they define a plane that one more confirms; further ones refine it."""
 
     def __init__(self) -> None:
         self._places: list[Array] = []
@@ -92,12 +92,12 @@ class SurfaceTouches:
         return len(self._places)
 
     def forget(self) -> int:
-        """Begin again; return how many touches there were."""
+        """Discard all touches; return their number."""
         count, self._places = len(self._places), []
         return count
 
     def add(self, place: Sequence[float], normal: Sequence[float], along: Sequence[float]) -> SurfaceFit | None:
-        """Take a touch; return the plane, None if there are too few."""
+        """Add a touch; return the plane, None if there are too few."""
         newest = np.array(place, dtype=float)
         for number, other in enumerate(self._places, start=1):
             apart_m = float(np.linalg.norm(newest - other))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""How a finger comes to the surface, presses and leaves: the parameters, and how fast it may go."""
+"""Parameters and speeds of approach, contact and lift of a finger."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from texture_exploration.force_control import stopping_m_s
 from texture_exploration.paths import ramp_s
 
 REACTION_S = 0.03  # from contact to standstill: two states of the arm, two steps of the exploration
-STEP_S = 0.014  # of exploration and arm, that an arm stands later than by its delay
-WALL_SHARE = 4.5  # times the force limit, with which a wall as stiff as declared may press until the arm stands
+STEP_S = 0.014  # of exploration and arm, by which an arm stops later than its delay
+WALL_SHARE = 4.5  # times the force limit, with which a wall as stiff as declared may press until the arm stops
 IMPACT = 0.8  # of the wanted force
-HARMLESS_N = 0.5  # a smaller force is not approached more slowly for what an arm does that hears nothing
+HARMLESS_N = 0.5  # below this force the watchdog of an arm does not limit the approach
 
 
 def stop_s(delay_s: float) -> float:
-    """Return how long after a contact an arm stands."""
+    """Return the time from a contact to the stop of an arm."""
     return max(REACTION_S, delay_s + STEP_S)
 
 
@@ -56,7 +56,7 @@ class TouchParams:
         low=0.001,
         high=0.5,
     )
-    unheard_force_fraction = 1.5  # of the wanted force, that an arm may reach which only its watchdog stops
+    unheard_force_fraction = 1.5  # of the wanted force, that an arm may reach until its watchdog stops it
     contact_force_n: float = param(
         0.2,
         'Force above which the finger counts as in contact; a larger force needs a harder touch.',
@@ -126,13 +126,13 @@ class TouchParams:
     )
     mean_friction = 2.0  # mean force along the surface by wanted force, of a slide that succeeds
     peak_friction = 3.0  # the same for 50 ms; states beyond it are not steady
-    lift_speed_m_s = 0.05  # away from the surface, once it is proven that up is up
+    lift_speed_m_s = 0.05  # away from the surface, once the direction of the normal is proven
     clearance_m = 0.005  # least rise after a contact
 
     def approach_m_s(self, force_n: float, watchdog_s: float = 0.0, delay_s: float = 0.0) -> float:
         """Return how fast the finger may come down to press with a force.
 
-        An arm that loses its commands just as it reacts to the contact goes on for the time of its watchdog. Until then
+        An arm that loses its commands at the moment of contact keeps moving until its watchdog stops it. Until then
         the force stays below `unheard_force_fraction` of the wanted one on a contact of `approach_stiffness_n_m`.
 
         Parameters
@@ -148,13 +148,13 @@ class TouchParams:
         return min(self.approach_speed_m_s, heard_m_s, unheard_m_s)
 
     def travel_m_s(self, limit_n: float, delay_s: float) -> float:
-        """Return how fast the finger may go where something may stand in its way, for an impact below a force."""
+        """Return the highest speed on a path with possible obstacles, for an impact below a force."""
         return min(self.travel_speed_m_s, stopping_m_s(limit_n, self.approach_stiffness_n_m, stop_s(delay_s)))
 
     def slide_m_s(self, limit_n: float, delay_s: float) -> float:
-        """Return how fast the finger may slide: from the force limit on, a wall presses on until the arm stands."""
+        """Return the highest sliding speed: beyond the force limit a wall presses until the arm stops."""
         return stopping_m_s((WALL_SHARE - 1.0) * limit_n, self.approach_stiffness_n_m, delay_s + STEP_S)
 
     def ramp_s(self, speed_m_s: float) -> float:
-        """Return how long it takes to gain or lose a speed."""
+        """Return the time to gain or lose a speed."""
         return ramp_s(speed_m_s, self.acceleration_m_s2, self.jerk_m_s3)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a finger still touches, moves as it is commanded, and slides as was asked."""
+"""Checks that a finger keeps contact, moves as commanded, and slides as requested."""
 
 from __future__ import annotations
 
@@ -59,21 +59,21 @@ class ContactWatch:
         since = f' for {lost_s * 1e3:.0f} ms' if lost_s else ''
         raise ContactLost(
             f'the contact with the surface was lost{since}: the force is {self._force_now_n:.2f} N of '
-            f'{self._force_n:g} N; check that the surface goes on along the whole path, or raise '
+            f'{self._force_n:g} N; check that the surface continues along the whole path, or raise '
             "'lost_contact_s' if it is rough"
         )
 
 
 # --------------------
-# Whether the finger moves along the surface as it is commanded to, and whether the slide was what was asked for.
+# Whether the finger moves along the surface as commanded, and whether the slide was as requested.
 
-PEAK_NS = 50_000_000  # speed and tangential force are means over so long: motors step, sensors are noisy
+PEAK_NS = 50_000_000  # averaging time of speed and tangential force: motors step, sensors are noisy
 FORCES = 3  # newest normal forces, of which the middle one counts: one alone may be wrong
 LONGEST_STEP_NS = 50_000_000  # a command that was given longer ago may have run out: the comparison starts again
 
 
 class StallWatch:
-    """Compare the way that the finger makes with the way that was commanded, over the last `stall_s`.
+    """Compare the distance of the finger with the commanded one, over the last `stall_s`.
 
     Only the way in the commanded direction counts, so that noise of the position does not add up, and a finger that
     goes to and fro may turn. Time is that of the arm's states; after a pause of this machine the comparison starts
@@ -117,21 +117,21 @@ class StallWatch:
             return
         raise MotionAborted(
             f'the finger stalled: in {self._touch.stall_s * 1e3:.0f} ms it moved by {made_m * 1e3:.2f} of '
-            f'{commanded_m * 1e3:.2f} mm; see what holds it, and whether the robot or its operator slows it down'
+            f'{commanded_m * 1e3:.2f} mm; check what blocks it, and whether the robot or its operator reduces its speed'
         )
 
 
 class SlideWatch:
-    """Compare mean and peak of speed, normal and tangential force of a slide with what was asked for.
+    """Compare mean and peak of speed, normal and tangential force of a slide with the request.
 
-    The speed is that from place to place, where the path asks for a constant one: not in turns. The tangential force
+    The speed is that from place to place, where the path has a constant one: not in turns. The tangential force
     counts where the arm measures it.
     """
 
     def __init__(self, speed_m_s: float, force_n: float, touch: TouchParams) -> None:
         self._speed_m_s, self._force_n = speed_m_s, force_n
         self._touch = touch
-        # A slide begins within twice the tolerance, so a smaller share would refuse what was let in.
+        # A slide begins within twice the tolerance, so a smaller fraction would refuse accepted starts.
         self._mean_force_fraction = max(touch.mean_force_fraction, 2 * touch.force_tolerance)
         self._recent: deque[ArmState] = deque()  # over PEAK_NS of constant speed
         self._forces: deque[float] = deque(maxlen=FORCES)
@@ -142,7 +142,7 @@ class SlideWatch:
         self._peaks = [0.0, 0.0, 0.0]  # normal force, speed, tangential force
 
     def update(self, arm: ArmState, constant: bool) -> bool:
-        """Take a state; return whether what it shows is within what was asked for."""
+        """Take a state; return whether it is within the tolerance of the request."""
         last_ns = self._recent[-1].time_ns if self._recent else 0
         self._states += 1
         self._force_sum_n += arm.force_n
@@ -163,7 +163,7 @@ class SlideWatch:
         return all(value <= most for value, most in zip(now, self._most, strict=True))
 
     def flaw(self) -> str:
-        """Return in a sentence what was asked and what was measured if that differs too much, '' if not."""
+        """Return in a sentence the request and the measurement if they differ too much, '' if not."""
         return '; '.join(self._differences())
 
     @property
@@ -182,21 +182,21 @@ class SlideWatch:
         if not abs(mean_n - asked_n) <= self._mean_force_fraction * asked_n:  # so NaN is none
             yield (
                 f'the mean force of the slide was {mean_n:.2f} N, more than {self._mean_force_fraction:.0%} off the '
-                f'{asked_n:g} N that were asked for; slide more slowly, or check the force '
+                f'{asked_n:g} N requested; slide more slowly, or check the force '
                 'control of the arm'
             )
         mean_m_s = self._way_m / self._way_s if self._way_s else asked_m_s
         if not abs(mean_m_s - asked_m_s) <= touch.mean_speed_fraction * asked_m_s:
             yield (
                 f'the mean speed of the slide was {mean_m_s:.4f} m/s, more than {touch.mean_speed_fraction:.0%} off '
-                f"the {asked_m_s:g} m/s that were asked for ('mean_speed_fraction'); see what scales the speed of the "
+                f"the {asked_m_s:g} m/s requested ('mean_speed_fraction'); check what scales the speed of the "
                 'arm'
             )
         mean_n = self._tangential_sum_n / max(1, self._tangential_states)
         if mean_n > touch.mean_friction * asked_n:
             yield (
                 f'the mean force along the surface was {mean_n:.2f} N, and {touch.mean_friction * asked_n:.2f} N are '
-                f'allowed with {asked_n:g} N asked for; see whether the finger catches on something'
+                f'allowed with {asked_n:g} N requested; check whether the finger catches on something'
             )
         measured = (
             ('force', 'N', f'{asked_n:g} N', 'peak_force_fraction'),
@@ -207,11 +207,11 @@ class SlideWatch:
             if not peak <= most:
                 yield (
                     f'the {what} of the slide reached {peak:.3g} {unit}, and {most:.3g} {unit} are allowed with '
-                    f'{asked} asked for' + (f" ('{parameter}')" if parameter else '')
+                    f'{asked} requested' + (f" ('{parameter}')" if parameter else '')
                 )
 
     def _add_way(self, arm: ArmState) -> None:
-        """Add up the way in pieces of PEAK_NS: noise of the place makes shorter ones too long."""
+        """Sum the distance in pieces of PEAK_NS: noise of the position makes shorter ones too long."""
         if self._chunk is None:
             self._chunk = arm
         took_ns = arm.time_ns - self._chunk.time_ns
@@ -231,13 +231,13 @@ class SlideWatch:
 
 
 # --------------------
-# Whether it presses too hard before the slide.
+# Whether the force is too high before the slide.
 
 OVERSHOOT = 0.2  # of the wanted force, that pressing may exceed it
 
 
 class OvershootWatch:
-    """End what presses harder than was asked for, before the slide: the middle one of the newest forces counts."""
+    """Abort before the slide if the force exceeds the request: the middle one of the newest forces counts."""
 
     def __init__(self, force_n: float, touch: TouchParams) -> None:
         self._force_n = force_n

@@ -154,8 +154,8 @@ function drawTaxels(taxels) {
   const side = Math.min(width / columns, height / rows);
   const left = (width - side * columns) / 2;
   values.forEach((value, k) => {
-    const share = Math.abs(value ?? 0) / most;
-    pen.fillStyle = value === null ? colour('--line') : `color-mix(in srgb, ${value < 0 ? '#e8590c' : '#1098ad'} ${Math.round(100 * share)}%, ${colour('--back')})`;
+    const fraction = Math.abs(value ?? 0) / most;
+    pen.fillStyle = value === null ? colour('--line') : `color-mix(in srgb, ${value < 0 ? '#e8590c' : '#1098ad'} ${Math.round(100 * fraction)}%, ${colour('--back')})`;
     pen.fillRect(left + places[k][1] * side, places[k][0] * side, side - 2, side - 2);
   });
 }
@@ -215,10 +215,10 @@ function showTexture(texture) {
   at('label').textContent = texture.label ? (texture.accepted ? texture.label : `${texture.label}?`) : '–';
   at('label').dataset.final = texture.final;
   const seen = texture.windows ? `${texture.windows} windows, ${texture.evidence_s.toFixed(1)} s` : '';
-  const sure = texture.label && texture.confidence !== null ? `confidence ${texture.confidence.toFixed(2)}` : '';
-  const strange = texture.label && !texture.accepted ? `rejected: ${texture.rejection}` : '';
+  const confidence = texture.label && texture.confidence !== null ? `confidence ${texture.confidence.toFixed(2)}` : '';
+  const rejected = texture.label && !texture.accepted ? `rejected: ${texture.rejection}` : '';
   const missing = texture.label ? '' : texture.missing || texture.message;
-  at('estimate-note').textContent = [sure, seen, strange, missing].filter(Boolean).join(' · ');
+  at('estimate-note').textContent = [confidence, seen, rejected, missing].filter(Boolean).join(' · ');
   const advice = texture.label ? texture.message : '';
   at('advice').hidden = !advice;
   at('advice').querySelector('summary').textContent = texture.accepted ? 'Advice' : 'Why';
@@ -235,8 +235,8 @@ function showTexture(texture) {
 
 function showRoughness(roughness) {
   if (roughness.model) at('roughness').hidden = false;
-  const share = roughness.valid ? Math.min(1, Math.max(0, (roughness.grade - 1) / 4)) : 0;
-  at('gauge-arc').style.strokeDasharray = `${100 * share} 100`;
+  const fraction = roughness.valid ? Math.min(1, Math.max(0, (roughness.grade - 1) / 4)) : 0;
+  at('gauge-arc').style.strokeDasharray = `${100 * fraction} 100`;
   at('grade').textContent = roughness.valid ? roughness.grade.toFixed(1) : '–';
   at('roughness-note').textContent = roughness.valid ? `± ${roughness.grade_std === null ? '?' : roughness.grade_std.toFixed(1)}` : roughness.message;
 }
@@ -273,14 +273,14 @@ function showRest(frame) {
 // Keep what is shown of an exploration while it goes on.
 function keep({ exploration_id: id, phase }, text) {
   if (!id || ENDED.includes(phase)) return;
-  const own = kept.get(id) || { texts: [], stride: 1, seen: 0 };
-  if (own.seen % own.stride === 0) own.texts.push(text);
-  own.seen += 1;
-  if (own.texts.length > MAX_FRAMES) {
-    own.texts = own.texts.filter((_, number) => number % 2 === 0);
-    own.stride *= 2;
+  const frames = kept.get(id) || { texts: [], stride: 1, seen: 0 };
+  if (frames.seen % frames.stride === 0) frames.texts.push(text);
+  frames.seen += 1;
+  if (frames.texts.length > MAX_FRAMES) {
+    frames.texts = frames.texts.filter((_, number) => number % 2 === 0);
+    frames.stride *= 2;
   }
-  kept.set(id, own);
+  kept.set(id, frames);
 }
 
 function replay(id) {
@@ -309,7 +309,7 @@ async function ask(name, body) {
     const reply = await answer.json();
     say(reply.message, !reply.success);
   } catch (error) {
-    say(`'${name}' was not answered: ${error.message}`, true);
+    say(`'${name}' got no answer: ${error.message}`, true);
   }
 }
 
@@ -338,7 +338,7 @@ function connect() {
     connected = true;
     last = Date.now();
     say('');
-    loadMotions().catch(() => say('the list of motions did not come; load the page again', true));
+    loadMotions().catch(() => say('the list of motions did not arrive; reload the page', true));
   };
   socket.onmessage = (message) => {
     const frame = JSON.parse(message.data);
@@ -379,6 +379,6 @@ at('collect').addEventListener('submit', (event) => {
 document.querySelectorAll('[data-ask]').forEach((button) => button.addEventListener('click', () => ask(button.dataset.ask, {})));
 at('record').addEventListener('click', () => ask('record', { on: !at('record').dataset.on }));
 window.setInterval(() => {
-  if (!connected || Date.now() - last > SILENT_MS) say('nothing comes from the dashboard; is it still running?', true);
+  if (!connected || Date.now() - last > SILENT_MS) say('no data from the dashboard; is it still running?', true);
 }, SILENT_MS);
 connect();

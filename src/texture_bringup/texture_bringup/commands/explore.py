@@ -47,7 +47,7 @@ NUMBERS = (
     ('turns', 'turns', 'N', 'turns, if the motion has some'),
     ('duration', 'duration_s', 'S', 'duration of an in-hand slide'),
 )
-UNLIKE = 'it resembles none of the known textures'
+UNLIKE = 'it resembles no trained texture'
 BAR = 24
 TIMEOUT_S = 300.0
 EXPLORER_S, SOON_S = 5.0, 1.0  # within which an explorer that runs is discovered, at most and usually
@@ -57,7 +57,7 @@ def _configure_explore(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('motion', nargs='?', default='', help=f'how to move: {", ".join(MOTIONS)}')
     parser.add_argument('--preset', metavar='NAME', help='make all motions of a preset instead, such as ets-linear')
     parser.add_argument(
-        '--repeats', type=int, default=0, metavar='N', help='rounds through a preset (default: as many as it says)'
+        '--repeats', type=int, default=0, metavar='N', help='rounds through a preset (default: as the preset declares)'
     )
     parser.add_argument('--json', action='store_true', help='print each result as one line of JSON')
     for option, _, unit, meaning in NUMBERS:
@@ -104,7 +104,7 @@ def _explore(options: argparse.Namespace) -> int:
                 if options.json:
                     print(json.dumps(as_json(result)), flush=True)
                 else:
-                    tell(result)
+                    print_result(result)
                 if not result.success:
                     break
                 made += 1
@@ -116,7 +116,7 @@ def _explore(options: argparse.Namespace) -> int:
     return code
 
 
-ACCEPTED, REJECTED, ABORTED = 0, 3, 4  # 1 is for a fault of a program, 2 for a mistake of its user
+ACCEPTED, REJECTED, ABORTED = 0, 3, 4  # 1: fault of the program, 2: invalid input of the user
 
 
 def exit_code(result: ExplorationResult) -> int:
@@ -132,7 +132,7 @@ OUTCOMES = {ACCEPTED: 'accepted', REJECTED: 'rejected', ABORTED: 'aborted', USER
 
 
 def as_json(result: ExplorationResult) -> dict[str, Any]:
-    """Return a result as JSON carries it: numbers that are not known are null."""
+    """Return a result for JSON: unknown numbers are null."""
     values = {
         'outcome': OUTCOMES[exit_code(result)],
         'error': result.error.name.lower(),
@@ -156,7 +156,7 @@ def finite(value: Any) -> Any:
 
 
 def explored(operator: Operator, request: ExplorationRequest) -> ExplorationResult:
-    """Explore with a line of progress; after Ctrl-C print how the exploration ended, which the operator must know."""
+    """Explore with a line of progress; after Ctrl-C print how the exploration ended."""
     try:
         with progress_line():
             return operator.explore(request, show_progress)
@@ -175,26 +175,26 @@ def progress_line() -> Iterator[None]:
             print(file=sys.stderr)
 
 
-def tell(explored: ExplorationResult) -> bool:
+def print_result(explored: ExplorationResult) -> bool:
     """Print how an exploration ended; return whether it succeeded."""
     if not explored.exploration_id:
         raise MotionRefused(explored.message)
     print(f'{explored.exploration_id}: {explored.message}')
     print(f'texture:   {texture_text(explored.texture)}')
-    if explored.roughness.valid or explored.roughness.message:  # else nothing estimates it
+    if explored.roughness.valid or explored.roughness.message:  # else there is no roughness model
         print(f'roughness: {roughness_text(explored.roughness)}')
     return bool(explored.success)
 
 
 def requests_of(options: argparse.Namespace) -> list[ExplorationRequest]:
-    """Return the requests that the options stand for, one for each direction."""
+    """Return the requests given by the options, one for each direction."""
     if bool(options.motion) == bool(options.preset):
         raise InvalidParameter('give the motion, such as linear_slide, or --preset NAME')
     if options.preset:
         if options.repeats < 0:
             raise InvalidParameter(f'--repeats is {options.repeats}; 1 or more rounds are needed')
         return [replace(one, surface=options.surface) for one in load_preset(options.preset).all(options.repeats)]
-    find(MOTIONS, options.motion, 'motion')  # said before an explorer is waited for
+    find(MOTIONS, options.motion, 'motion')  # refused before the wait for an explorer
     numbers = {field: getattr(options, option) for option, field, _, _ in NUMBERS}
     x_m, y_m = options.start or (0.0, 0.0)
     request = ExplorationRequest(
@@ -211,23 +211,23 @@ def requests_of(options: argparse.Namespace) -> list[ExplorationRequest]:
 
 
 def show_progress(state: ExplorationState, texture: TextureEstimate) -> None:
-    """Draw how far it is, on one line of a terminal."""
+    """Draw the progress on one line of a terminal."""
     if not sys.stderr.isatty():
         return
-    share = state.progress if state.progress >= 0 else 0.0
-    bar = '█' * round(BAR * share)
+    fraction = state.progress if state.progress >= 0 else 0.0
+    bar = '█' * round(BAR * fraction)
     print(f'\r{state.phase.value:<9}|{bar:<{BAR}}| {progress_text(texture):<60}', end='', file=sys.stderr, flush=True)
 
 
 def texture_text(estimate: TextureEstimate) -> str:
-    """Return a texture estimate in words, with the reason if it is not known."""
+    """Return a texture estimate as text, with the reason if it is rejected."""
     if not estimate.label or estimate.accepted:
         return progress_text(estimate)
     return f'{progress_text(estimate)}: {estimate.message or UNLIKE}'
 
 
 def progress_text(estimate: TextureEstimate) -> str:
-    """Return a texture estimate in so few words that they fit the line of the progress."""
+    """Return a texture estimate as text that fits the progress line."""
     if not estimate.label:
         return estimate.message or 'none yet'
     nearest = f'{estimate.label}, confidence {estimate.confidence:.2f} after {estimate.evidence_s:.1f} s'
@@ -235,7 +235,7 @@ def progress_text(estimate: TextureEstimate) -> str:
 
 
 def roughness_text(estimate: RoughnessEstimate) -> str:
-    """Return a roughness estimate in words."""
+    """Return a roughness estimate as text."""
     if not estimate.valid:
         return estimate.message
     return f'{estimate.grade:.1f} ± {estimate.grade_std:.1f} on the scale from 1 (smooth) to 5 (rough)'
@@ -244,7 +244,7 @@ def roughness_text(estimate: RoughnessEstimate) -> str:
 # --------------------
 # Identify.
 
-SHOWN = 3  # textures, of those that are possible
+SHOWN = 3  # most probable textures that are printed
 
 
 def _configure_identify(parser: argparse.ArgumentParser) -> None:
@@ -256,7 +256,7 @@ def _configure_identify(parser: argparse.ArgumentParser) -> None:
 
 
 def _identify(options: argparse.Namespace) -> int:
-    """Slide until the label is decided; return 1 as soon as a slide was ended early by a fault or a stop."""
+    """Slide until the label is decided; return 1 after a slide that a fault or a stop ended."""
     if options.most < 1 or not 0.0 < options.sure <= 1.0:
         raise InvalidParameter(
             f'--most is {options.most} and --sure {options.sure:g}; 1 or more and a probability are needed'
@@ -265,7 +265,7 @@ def _identify(options: argparse.Namespace) -> int:
     known = model.next_touch_model
     if known is None:
         raise InvalidParameter(
-            f"model '{model.name}' knows no motions to choose from; train it on slides over every texture, two or more "
+            f"model '{model.name}' has no motions to choose from; train it on slides over every texture, two or more "
             'of each kind, in several directions or at several speeds or forces'
         )
     belief, number = known.uniform_log_prior, 0
@@ -278,7 +278,7 @@ def _identify(options: argparse.Namespace) -> int:
             with progress_line():
                 explored, vectors = operator.explore_with_features(request_of(motion, options.surface), show_progress)
             if not explored.success:
-                return int(not tell(explored))
+                return int(not print_result(explored))
             belief = known.update(belief, motion, slide_values(vectors, model.feature_set))
             likely = np.argsort(-belief, kind='stable')[:SHOWN]
             print(f'  {", ".join(f"{known.textures[k]} {np.exp(belief[k]):.2f}" for k in likely)}')
@@ -300,7 +300,7 @@ def request_of(motion: SlideMotion, surface: str) -> ExplorationRequest:
 
 
 def motion_text(motion: SlideMotion) -> str:
-    """Return a motion in words."""
+    """Return a motion as text."""
     return (
         f'{motion.motion}, direction {math.degrees(motion.direction_rad):.0f}°, {motion.speed_m_s:g} m/s, '
         f'{motion.force_n:g} N, {motion.duration_s:g} s'
@@ -311,7 +311,7 @@ def motion_text(motion: SlideMotion) -> str:
 # Collect slides of a surface; check the finger on the reference plate.
 
 PLATE = 'reference plate'
-# By option: field of the request, unit, meaning, and what is taken where no reference tells it.
+# By option: field of the request, unit, meaning, and default where no reference gives one.
 PLATE_NUMBERS = {
     'speed': ('speed_m_s', 'm/s', 'speed of the slide', 0.05),
     'force': ('force_n', 'N', 'normal force, 0 for the default of the motion', 0.0),
@@ -339,7 +339,7 @@ def _configure_collect(parser: argparse.ArgumentParser) -> None:
 
 
 def _collect(options: argparse.Namespace) -> int:
-    """Collect, say after a few places how well left-out ones are told; return 0 if the bound is met, else 1."""
+    """Collect, and report how well left-out places are recognised; return 0 if the bound is met, else 1."""
     given = {'distance_m': options.distance} if options.distance is not None else {}
     for option, names, _, _ in RANGES:
         given |= dict(zip(names, getattr(options, option) or (), strict=False))
@@ -385,7 +385,7 @@ def _check(options: argparse.Namespace) -> int:
     if options.today or options.trained:
         print(adapt_to_today(options.model, options.trained or (), options.today or ())[1])
         return 0
-    # What is missing is said before the robot moves.
+    # Report what is missing before the robot moves.
     topics = load_model(options.model).recipe.feature_set.topics
     reference, made = ({}, {}) if options.store else read_reference(options.model)
     request = None if options.bag else plate_request(options, made)
@@ -413,7 +413,7 @@ def plate_request(options: argparse.Namespace, stored: Mapping[str, float]) -> E
 
 
 def slide_over_plate(bag: Path, request: ExplorationRequest, namespace: str, count: int) -> None:
-    """Slide over the reference plate so many times, and record that into a bag; MotionAborted if a slide fails."""
+    """Slide over the reference plate `count` times and record a bag; MotionAborted if a slide fails."""
     with Operator(namespace) as operator:
         operator.wait_for_explorer(EXPLORER_S, SOON_S)
         with recorder(operator, bag, namespace):
@@ -430,4 +430,4 @@ identify = Command(
 collect = Command(
     'touch a surface at many places of the taught patch, and record labelled slides', _configure_collect, _collect
 )
-check = Command('slide over the reference plate, and say whether the finger is as trained', _configure_check, _check)
+check = Command('slide over the reference plate, and report whether the finger is as trained', _configure_check, _check)

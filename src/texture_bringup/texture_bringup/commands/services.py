@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The sub-commands of `texture` that ask a running node for one thing and print its answer."""
+"""The sub-commands of `texture` that call one service of a running node and print the answer."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ TOUCHES_MISSING = "the launch files 'ur' and 'ros_controllers' offer it; start o
 
 
 def trigger(summary: str, service: str, advice: str = EXPLORER_MISSING) -> Command:
-    """Return the sub-command that calls a service; `advice` says what to do when no node offers it."""
+    """Return the sub-command that calls a service; `advice` is the remedy when no node offers it."""
 
     def run(options: argparse.Namespace) -> int:
         with Operator(options.namespace) as operator:
@@ -34,7 +34,7 @@ def trigger(summary: str, service: str, advice: str = EXPLORER_MISSING) -> Comma
 stop = trigger(
     'end the exploration and lift the finger, from any phase',
     'explorer/stop',
-    'no explorer runs there; if the robot moves, use its own stop, and look whether the finger touches',
+    'no explorer runs there; if the robot moves, use its emergency stop and check whether the finger presses',
 )
 recover = trigger('free the arm from a fault', 'explorer/recover')
 lift = trigger('lift a finger that was left pressed on the surface', 'explorer/lift')
@@ -43,8 +43,8 @@ reboot = trigger(
     'explorer/reboot',
     "only the launch file 'hand' offers it; start that, or give its --namespace",
 )
-touch_surface = trigger('take one of the touches that find the surface', 'explorer/touch_surface', TOUCHES_MISSING)
-forget_touches = trigger('begin the touches that find the surface again', 'explorer/forget_touches', TOUCHES_MISSING)
+touch_surface = trigger('take one touch of the surface calibration', 'explorer/touch_surface', TOUCHES_MISSING)
+forget_touches = trigger('restart the touches of the surface calibration', 'explorer/forget_touches', TOUCHES_MISSING)
 tare = trigger(
     'tare a sensor that nothing touches',
     'sensor/tare',
@@ -52,7 +52,7 @@ tare = trigger(
 )
 
 # --------------------
-# Textures that a running classifier learns and forgets.
+# Textures that are added to and removed from a running classifier.
 
 
 def _configure_add(parser: argparse.ArgumentParser) -> None:
@@ -96,7 +96,7 @@ remove = Command('remove a texture that was added since the training', _configur
 
 def _activating(active: bool) -> tuple[Callable[[argparse.ArgumentParser], None], Callable[[argparse.Namespace], int]]:
     """Return what `activate` or `deactivate` is configured by, and what it does."""
-    # The arm is let go first, and taken last.
+    # The arm is released first and activated last.
     usual = ['sensor', 'explorer'] if active else ['explorer', 'sensor']
 
     def configure(parser: argparse.ArgumentParser) -> None:

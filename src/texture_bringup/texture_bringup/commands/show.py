@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The sub-commands of `texture` that look at what there is: catalogues, a bag or a model, this machine."""
+"""The sub-commands of `texture` that show catalogues, a bag or a model, and this machine."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def _info(options: argparse.Namespace) -> int:
     from texture_recordings.bags import find_bags
 
     path = Path(options.path)
-    # A model is one of two files that share a name; everything else is looked for as a bag, which says what is wrong.
+    # A model is one of two files with the same name; everything else is read as a bag, whose errors are reported.
     if not path.is_dir() and (path.suffix in ('.npz', '.json') or path.with_name(f'{path.name}.npz').is_file()):
         print('\n'.join(_model_lines(path)))
         return 0
@@ -184,7 +184,7 @@ def _ports() -> str:
     from serial.tools import list_ports
 
     found = [f'{port.device} ({port.description})' for port in list_ports.comports()]
-    return ', '.join(found) or 'none; plug the sensor in, and see whether its kernel driver is loaded'
+    return ', '.join(found) or 'none; plug the sensor in, and check whether its kernel driver is loaded'
 
 
 def _groups() -> str:
@@ -212,7 +212,7 @@ def _dds() -> str:
         from texture_bringup.operator import middleware
 
         name = middleware()
-    except Exception as error:  # whatever a broken installation raises: this command shows it
+    except Exception as error:  # this command reports any error of a broken installation
         name = f'cannot be loaded: {error}'
     domain, reach = os.environ.get('ROS_DOMAIN_ID', '0'), os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE', 'SUBNET')
     return f'{name}, domain {domain}, discovery range {reach}'
@@ -242,4 +242,4 @@ def _doctor(_options: argparse.Namespace) -> int:
 
 list_ = Command('list what can be chosen: sensors, motions, arms, recipes, surfaces', _configure_list, _list)
 info = Command('show what a bag or a model holds', _configure_info, _info)
-doctor = Command('show what of this machine matters: ports, groups, ROS, versions', lambda _parser: None, _doctor)
+doctor = Command('show what matters of this machine: ports, groups, ROS, versions', lambda _parser: None, _doctor)

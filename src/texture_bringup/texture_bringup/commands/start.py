@@ -90,9 +90,9 @@ def _look_at(program: str, value: str, *more: str) -> None:
 
 
 def refuse_wrong(nodes: Sequence[NodeDescription], given: set[str]) -> None:
-    """Raise, before any node starts, what one of the suite's would say of a value that was given.
+    """Raise, before any node starts, the error of a node of the suite for a value that was given.
 
-    In a process of its own: libraries that start threads must not be in a launcher.
+    In a separate process: libraries that start threads must not be in a launcher.
     """
     wanted = []
     for node in nodes:

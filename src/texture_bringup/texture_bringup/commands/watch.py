@@ -73,7 +73,7 @@ def _play(bag: str, rate: float, namespace: str, feed: Feed, show: Callable[[], 
 
 
 def _picture(feed: Feed, live: Live) -> Callable[[], None]:
-    """Return what draws the newest frame, ten times a second at most."""
+    """Return a function that draws the newest frame, at most ten times a second."""
     drawn_s, peak = 0.0, 0.0
 
     def show() -> None:
@@ -110,9 +110,9 @@ def picture(frame: Frame, peak: float) -> Group:
     )
 
 
-def bar(share: float, style: str) -> Text:
+def bar(fraction: float, style: str) -> Text:
     """Return a bar that is filled to a fraction."""
-    full = round(BAR * min(max(share, 0.0), 1.0))
+    full = round(BAR * min(max(fraction, 0.0), 1.0))
     return Text.assemble(('█' * full, style), ('─' * (BAR - full), 'dim'))
 
 
@@ -121,7 +121,7 @@ def bar(share: float, style: str) -> Text:
 
 
 def _lines(feed: Feed) -> Callable[[], None]:
-    """Return what prints the newest frame, if its phase or its estimate is another."""
+    """Return a function that prints the newest frame if its phase or its estimate has changed."""
     last: tuple[Any, ...] = ()
 
     def show() -> None:
@@ -146,7 +146,7 @@ def line(frame: Frame) -> str:
 
 
 def finger_text(state: Mapping[str, Any]) -> str:
-    """Return speed, force, motion and what ended it of a frame in words."""
+    """Return speed, force, motion and error of a frame as text."""
     numbers = [
         f'{state[name]:.{digits}f} {unit}'
         for name, digits, unit in (('speed_m_s', 3, 'm/s'), ('force_n', 2, 'N'))
@@ -157,17 +157,17 @@ def finger_text(state: Mapping[str, Any]) -> str:
 
 
 def texture_text(texture: Mapping[str, Any]) -> str:
-    """Return the estimate of a frame in words: the label and whether it is accepted, or why there is none."""
+    """Return the estimate of a frame as text: the label and whether it is accepted, or why there is none."""
     if not texture['label']:
         return str(texture['message'] or texture['missing'] or 'none yet')
     verdict = 'accepted' if texture['accepted'] else f'rejected: {texture["rejection"]}'
-    sure = '' if texture['confidence'] is None else f', confidence {texture["confidence"]:.2f}'
+    confidence = '' if texture['confidence'] is None else f', confidence {texture["confidence"]:.2f}'
     decided = ', decided' if texture['decided'] else ''
-    return f'{texture["label"]}{sure} after {texture["evidence_s"]:.1f} s, {verdict}{decided}'
+    return f'{texture["label"]}{confidence} after {texture["evidence_s"]:.1f} s, {verdict}{decided}'
 
 
 def roughness_text(roughness: Mapping[str, Any]) -> str:
-    """Return the grade of a frame in words."""
+    """Return the roughness of a frame as text."""
     if not roughness['valid']:
         return str(roughness['message'])
     return f'{roughness["grade"]:.1f} on the scale from 1 (smooth) to 5 (rough)'

@@ -17,7 +17,7 @@ from texture_core.config import param
 from texture_core.errors import DeviceError, LaunchFailed
 from texture_core.ros import declare, run
 
-STOPPED = threading.Event()  # this process was told to end
+STOPPED = threading.Event()  # this process was asked to end
 
 
 @dataclass(frozen=True)
@@ -43,19 +43,19 @@ class BringUp(Node):
         super().__init__('bring_up', **kwargs)
         params = declare(self, BringUpParams)
         names, lifecycle = params.nodes.split(), params.lifecycle_nodes.split()
-        with Operator(self.get_namespace(), guard=_end_when_told) as operator:
+        with Operator(self.get_namespace(), guard=_end_when_stopped) as operator:
             for place, name in enumerate(names, start=1):
                 try:
                     operator.wait_for_node(name, params.timeout_s)
                     state = operator.set_active(name, True) if name in lifecycle else 'there'
                 except LaunchFailed as error:
-                    later = f'; not activated or looked for: {", ".join(names[place:])}' if names[place:] else ''
+                    later = f'; not activated or not reached: {", ".join(names[place:])}' if names[place:] else ''
                     raise DeviceError(f'{error}{later}') from error
                 self.get_logger().info(f"'{name}' is {state}")
         self.get_logger().info(f'all nodes are up: {params.nodes}')
 
 
-def _end_when_told() -> None:
+def _end_when_stopped() -> None:
     if STOPPED.is_set():
         raise ExternalShutdownException
 

@@ -49,7 +49,7 @@ from texture_evaluation.collection import (
 from texture_features.feature_set import FeatureSet
 from texture_recordings.dataset import SlideDataset
 
-RECIPE = 'default'  # whose features tell the places apart
+RECIPE = 'default'  # whose features distinguish the places
 RECORDER_S = 30.0  # to start, and to complete the bag
 FLUSHED_S = 20.0  # within which what was recorded can be read: a recorder may be behind
 RECORDED = ('signal', 'exploration')
@@ -70,8 +70,8 @@ def collect_surface(
     low_x, high_x, low_y, high_y, low_n, high_n, high_m_s = operator.parameters('explorer', (*PATCH, *LIMITS))
     if not (low_x < high_x and low_y < high_y):
         raise InvalidData(
-            'no surface is taught: touch the corners of the surface by `texture touch-surface`, or give the explorer '
-            f'{", ".join(PATCH)}'
+            'no surface patch is taught: touch the corners of the surface with `texture touch-surface`, or give the '
+            f'explorer {", ".join(PATCH)}'
         )
     patch = Patch(low_x, high_x, low_y, high_y)
     plan = PlacePlan(surface, params, patch, (low_n, high_n), (LEAST_SPEED_M_S, high_m_s))
@@ -88,17 +88,17 @@ def collect_surface(
             return explored.error, explored.message
 
         end = collect(plan, params, explore, partial(_evaluate_bag, bag, surface), tell)
-    # Where the recorder has ended, what lies there may be another's.
+    # Where the recorder has ended, the bag there may be another one.
     if end.slides or end.error is CollectionError.NOT_RECORDED:
         return end, bag
     shutil.rmtree(bag, ignore_errors=True)
-    with suppress(OSError):  # other surfaces lie in it
+    with suppress(OSError):  # other surfaces are in it
         folder.rmdir()
     return replace(end, message=f'{end.message}; no slide was made, so no bag is kept'), None
 
 
 def _evaluate_bag(bag: Path, surface: str, slides: int) -> PlaceAccuracy:
-    """Judge all bags of the folder, once the newest one shows so many slides on the disk."""
+    """Evaluate all bags of the folder, once the newest one has `slides` slides on the disk."""
     feature_set = FeatureSet.load(RECIPE)
     deadline_s = time.monotonic() + FLUSHED_S
     while True:
@@ -117,20 +117,20 @@ def _evaluate_bag(bag: Path, surface: str, slides: int) -> PlaceAccuracy:
 def recorder(
     operator: Operator, bag: Path, namespace: str, environment: Mapping[str, str] | None = None
 ) -> Iterator[Callable[[], None]]:
-    """Record into a bag by a process of its own; the function raises InvalidData, with what it said, if that ended."""
+    """Record a bag in a separate process; the function raises InvalidData, with its last message, if that ended."""
     operator.wait_for_listeners(RECORDED, 1, lambda: None)  # the feature extractor; by then all others are found
     wanted = {topic: operator.listeners(topic) + 1 for topic in RECORDED}
     command = [sys.executable, '-m', 'texture_bringup.command', 'record', str(bag), '--namespace', namespace]
     with tempfile.TemporaryFile('w+') as output:
         process = subprocess.Popen(command, stdout=output, stderr=output, start_new_session=True, env=environment)
 
-        def said() -> str:
+        def last_message() -> str:
             output.seek(0)
             return output.read().strip().rpartition('\n')[2]
 
         def check() -> None:
             if process.poll() is not None:
-                raise InvalidData(f'the recorder ended: {said()}')
+                raise InvalidData(f'the recorder ended: {last_message()}')
 
         try:
             for topic, number in wanted.items():

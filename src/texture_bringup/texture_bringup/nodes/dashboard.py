@@ -97,7 +97,7 @@ class DashboardNode(Node):
     async def explore(self, asked: Mapping[str, Any]) -> Mapping[str, Any]:
         """Explore until it is over."""
         if 'motion' not in asked:
-            raise InvalidParameter('no motion is asked for; give its name as `motion`')
+            raise InvalidParameter('no motion is requested; give its name as `motion`')
         request = from_mapping(ExplorationRequest, {name: _short(value) for name, value in asked.items()})
         await ready(self._explorer.server_is_ready, 'explorer')
         wanted = action.Explore.Goal(request=to_msg(request))
@@ -207,9 +207,7 @@ class DashboardNode(Node):
     async def _run(self, name: str, *arguments: str) -> Mapping[str, Any]:
         """Run a sub-command of `texture`, one at a time; the page shows each line of it, the last at its end."""
         if self._feed.working:
-            raise InvalidParameter(
-                f'the page has started this already: {self._feed.working}; wait for it, or press Stop'
-            )
+            raise InvalidParameter(f'the page already runs: {self._feed.working}; wait for it, or press Stop')
         self._feed.working = f'{name}: starting'
         command = [sys.executable, '-m', 'texture_bringup.command', name, *arguments]
         namespace = self.get_namespace().strip('/')
@@ -219,8 +217,8 @@ class DashboardNode(Node):
                 *command, '--namespace', namespace, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT
             )
             assert self._command.stdout is not None
-            async for said in self._command.stdout:
-                line = said.decode(errors='replace').strip().removeprefix('texture: ') or line
+            async for output in self._command.stdout:
+                line = output.decode(errors='replace').strip().removeprefix('texture: ') or line
                 self._feed.working = f'{name}: {line}'
             return {'success': await self._command.wait() == 0, 'message': line}
         finally:

@@ -26,7 +26,7 @@ from texture_core.errors import TextureError
 from texture_core.ros import SENSOR_QOS, STATE_QOS, DiagnosticReport, Diagnostics, declare, from_msg, run, to_stamp
 from texture_core.types import NANOSECONDS, ExplorationState, Phase, TactileSignal
 
-WATCH_S = 0.5  # how often it is asked who looks
+WATCH_S = 0.5  # period of the check for subscribers
 PATH_S = 0.2  # how often the path is drawn anew
 PATH_POINTS = 5000
 PATH_WIDTH_M = 0.001
@@ -56,7 +56,7 @@ def curve(batch: TactileSignal, max_rate_hz: float) -> Iterator[tuple[int, NDArr
     """Yield time, ns, and value of each channel, (n_channels,), of the points by which a batch is drawn.
 
     They are its samples or, where these are more than `max_rate_hz`, the lowest and the highest of as many samples as
-    needed, half of these samples apart.
+    needed, at a spacing of half of these samples.
     """
     step = 2 * math.ceil(batch.sampling_rate_hz / max_rate_hz) if batch.sampling_rate_hz > max_rate_hz else 1
     starts = np.arange(0, len(batch.samples), step)
@@ -83,13 +83,13 @@ def taxel_image(batch: TactileSignal) -> NDArray[np.float32]:
 def path_colours(powers: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return red, green and blue, (n, 3), of powers, (n,): they differ by factors, so colours follow the logarithm."""
     logs = np.log(powers + np.finfo(float).tiny)
-    share = (logs - logs.min()) / (np.ptp(logs) or 1.0)
-    colours: NDArray[np.float64] = WEAK + share[:, None] * (STRONG - WEAK)
+    fraction = (logs - logs.min()) / (np.ptp(logs) or 1.0)
+    colours: NDArray[np.float64] = WEAK + fraction[:, None] * (STRONG - WEAK)
     return colours
 
 
 class Views(Node):
-    """Publish views of the topics in its namespace; each is computed only while somebody subscribes to it."""
+    """Publish views of the topics in its namespace; each is computed only while it has a subscriber."""
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('views', **kwargs)
@@ -187,8 +187,8 @@ class Views(Node):
 
     def _report(self) -> DiagnosticReport:
         watched = [publisher.topic_name for publisher, _, subscriptions in self._views if subscriptions]
-        said = f'shows {", ".join(watched)}' if watched else 'nobody looks, so nothing is computed'
-        return 'WARN' if self._bad else 'OK', said, {'bad_messages': self._bad}
+        message = f'shows {", ".join(watched)}' if watched else 'no subscriber, so nothing is computed'
+        return 'WARN' if self._bad else 'OK', message, {'bad_messages': self._bad}
 
 
 def _newest(batch: TactileSignal) -> Header:

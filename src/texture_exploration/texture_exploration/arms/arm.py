@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What an arm is to the explorer: commands, states, limits of commands, the surface's frame, zeroing of forces."""
+"""Interface of an arm to the explorer: commands, states, frame of the surface, zeroing of the force sensor."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from texture_core.types import Array, rotation_matrix
 from texture_exploration.force_control import ContactState, ForceLoop, ForceLoopParams
 
 # --------------------
-# What every arm that carries the finger can do, whatever it is made of.
+# Interface of every arm that carries the finger.
 
 Vector = tuple[float, float, float]  # x, y in the surface, z away from it
 
@@ -43,9 +43,9 @@ class ArmState:
     force normal to the surface, positive when pressing; `along_n` that of the surroundings on the finger along x and y
     of the surface, NaN if the arm measures the normal force only; `tangential_force_n` the force of the surface against
     the direction of travel, NaN if the arm does not measure it or the finger does not slide. `fault` says why the arm
-    cannot move; '' if it can. For `watchdog_s` at most the arm goes on with its last velocity when it hears nothing
-    more; 0 if it does not say. `delay_s` passes from a force to the motion that answers it. `unsafe` says why it must
-    not go on although it obeys: it is to be lifted; '' if it may.
+    cannot move; '' if it can. Without further commands the arm keeps its last velocity for `watchdog_s` at most; 0 if
+    unknown. `delay_s` passes from a force to the motion that responds to it. `unsafe` says why the finger must be
+    lifted although the arm obeys; '' if it need not.
     """
 
     time_ns: int
@@ -73,7 +73,7 @@ class ArmState:
 
 @dataclass(frozen=True)
 class ArmCommand:
-    """What the finger shall do from now on: a velocity along the surface, and a velocity or a force normal to it.
+    """Command to the finger: a velocity along the surface, and a velocity or a force normal to it.
 
     `normal_m_s` is positive away from the surface. If `force_n` is given, the arm controls that pressing force instead
     and ignores `normal_m_s`: above the surface it comes down until it presses.
@@ -88,17 +88,17 @@ STANDSTILL = ArmCommand()
 
 
 class ForceReading(enum.Enum):
-    """What the measured force of an arm does by itself; decides what counts as a frozen reading."""
+    """How the measured force of an arm varies without contact changes; decides what counts as a frozen reading."""
 
     NOISY = enum.auto()  # never twice the same to the last bit: a force sensor finer than its noise
     MEASURED = enum.auto()  # may stay the same, but not while the finger moves along the normal in contact
-    CONTROLLED = enum.auto()  # the arm may keep it the same while it follows a surface: motor currents, own force mode
+    CONTROLLED = enum.auto()  # the arm may keep it the same while it follows a surface: motor currents, a force mode
 
 
 class Arm:
     """An arm under hybrid control: velocity along the surface, velocity or force along its normal; a base of all arms.
 
-    A command holds until the next one, but at most for a fraction of a second: an arm without commands stops by itself.
+    A command holds until the next one, but at most for a fraction of a second: an arm without commands stops.
     Any method but `close` raises DeviceError if the arm cannot be reached. What an arm can do beyond moving, it
     overrides.
     """
@@ -106,7 +106,7 @@ class Arm:
     Params: type[Any]
     force_reading = ForceReading.CONTROLLED
     reboots = False
-    keeps_start = False  # nobody else moves it: explorations begin where they did before it was let go
+    keeps_start = False  # nothing else moves it: explorations begin at the same place after a release
 
     def __init__(self, params: Any) -> None:
         """Take the parameters; nothing is reached yet."""
@@ -116,11 +116,11 @@ class Arm:
         raise NotImplementedError
 
     def close(self) -> None:
-        """Stop, and let the arm go; never raises, may be called twice."""
+        """Stop, and release the arm; never raises, may be called twice."""
         raise NotImplementedError
 
     def state(self) -> ArmState:
-        """Return the newest measured state at once; its age tells whether the arm still answers."""
+        """Return the newest measured state at once; its age shows whether the arm still answers."""
         raise NotImplementedError
 
     def command(self, command: ArmCommand) -> None:
@@ -128,11 +128,11 @@ class Arm:
         raise NotImplementedError
 
     def stop(self) -> None:
-        """Stand still and hold the position, whatever the arm was doing; may be called from any thread."""
+        """Stop and hold the position in any state; may be called from any thread."""
         raise NotImplementedError
 
     def check(self) -> None:
-        """Return if the arm answers and could move, without keeping control; DeviceError says why not."""
+        """Return if the arm answers and could move, without keeping control; DeviceError with the reason if not."""
         try:
             self.connect()
             self.state()
@@ -140,15 +140,15 @@ class Arm:
             self.close()
 
     def recover(self) -> None:
-        """Come free from a fault without being connected again; whoever calls it sees that the arm may move."""
-        raise DeviceError('this arm comes free from a fault only by being connected again')
+        """Recover from a fault without a new connection; the caller makes sure that the arm may move."""
+        raise DeviceError('this arm recovers from a fault only when it is connected again')
 
     def reboot(self) -> str:
-        """Let go, reboot the motors that report an error, stay unconnected; return what was done."""
+        """Release the arm, reboot the motors that report an error, stay unconnected; return what was done."""
         raise DeviceError('this arm has no motors that could be rebooted; use recover')
 
     def warning(self) -> str:
-        """Return in a sentence what is not as it should be although the arm moves, '' if nothing."""
+        """Return a warning in a sentence although the arm moves, '' if there is none."""
         return ''
 
     def doubt(self) -> str:
@@ -162,7 +162,7 @@ class Arm:
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Totals that the operator should know, by name; DeviceError if the arm is not connected."""
+        """Totals for the operator, by name; DeviceError if the arm is not connected."""
         return {}
 
     @property
@@ -176,12 +176,12 @@ class Arm:
         raise NotImplementedError
 
     def move_surface(self, pose: Sequence[float]) -> None:
-        """Let go, and take over another pose of the surface, (6,); it holds from the next connection on."""
+        """Release the arm and set another pose of the surface, (6,), from the next connection on."""
         raise NotImplementedError
 
 
 # --------------------
-# The frame of the surface, as an arm with a base frame of its own sees it.
+# The frame of the surface in the base frame of an arm.
 
 PoseParamsT = TypeVar('PoseParamsT', bound='SurfacePoseParams')
 
@@ -199,7 +199,7 @@ def _rotation(axis: str) -> Any:
 
 @dataclass(frozen=True)
 class SurfacePoseParams:
-    """Where the surface is, seen from the base of an arm; a base of the parameters of each arm with a base frame."""
+    """Pose of the surface in the base frame of an arm; a base of the parameters of each arm with a base frame."""
 
     surface_x_m: float = _place(0.4, 'X')
     surface_y_m: float = _place(0.0, 'Y')
@@ -263,7 +263,7 @@ class SurfaceArm(Arm):
         return pose
 
     def move_surface(self, pose: Sequence[float]) -> None:
-        """Let go, and take over another pose of the surface; it holds from the next connection on."""
+        """Release the arm and set another pose of the surface, from the next connection on."""
         self.close()
         self._params = self._params.at_surface(pose)
         self._frame = SurfaceFrame(self._params.surface_pose)
@@ -272,7 +272,7 @@ class SurfaceArm(Arm):
 # --------------------
 # Tangential force of a sliding finger, from the force vector of a wrist sensor.
 
-SLIDING_M_S = 1e-3  # a slower finger has no direction of travel that its noise does not turn
+SLIDING_M_S = 1e-3  # below, noise dominates the direction of travel
 
 
 def tangential_force_n(force_n: Vector, velocity_m_s: Vector) -> float:
@@ -284,11 +284,11 @@ def tangential_force_n(force_n: Vector, velocity_m_s: Vector) -> float:
 
 
 # --------------------
-# An arm that knows velocities alone and follows them late, with a force loop of ours around it.
+# An arm that accepts only velocities and follows them with a delay, with a force loop of the suite around it.
 
 
 class CommandedVelocity:
-    """Choose the velocity that carries out a command: a wanted force by the force loop, a velocity as it is.
+    """Choose the velocity for a command: a wanted force by the force loop, a velocity unchanged.
 
     Towards the surface a commanded velocity is limited to what the force loop can still stop in time.
     """
@@ -297,38 +297,38 @@ class CommandedVelocity:
         self._loop = ForceLoop(params, period_s)
 
     def doubt(self) -> str:
-        """Return in a sentence why nobody should press by the force of this arm, '' if one may."""
+        """Return in a sentence why the force of this arm must not be used for control, '' if it may."""
         return self._loop.doubt
 
     def choose(self, command: ArmCommand, state: ArmState, held_s: float) -> Vector:
-        """Return the velocity to ask for, m/s."""
+        """Return the velocity to command, m/s."""
         if command.force_n is None:
             self._loop.restart()
-            self._loop.doubt = ''  # whoever lifts has read it
+            self._loop.doubt = ''  # a lift begins after it was reported
             return (*command.tangential_m_s, max(command.normal_m_s, -self._loop.approach_m_s))
         contact, speed_m_s = ContactState(state.time_ns, state.force_n), math.hypot(*command.tangential_m_s)
         return (*command.tangential_m_s, self._loop.velocity_m_s(command.force_n, contact, speed_m_s, held_s))
 
 
 # --------------------
-# One commander a robot: a lock that the kernel frees however its holders end, and the process that stops the robot.
+# One commander per robot: a lock that the kernel frees at any end of its holders, and the process that stops the robot.
 
 RUNTIME = Path(
     '/dev/shm'
-)  # one a host, for all users; no environment variable moves it, and no service has a private one
+)  # one per host, for all users; independent of environment variables and private folders of services
 DONE = b'.'
 LEAVE_S = 2.0
-ENDING = threading.Event()  # set once this process was told to end
+ENDING = threading.Event()  # set once this process was asked to end
 
 
 def give_up_when_ending() -> None:
-    """Raise DeviceError once this process was told to end; called by what waits for a robot to be ready."""
+    """Raise DeviceError once this process was asked to end; called while waiting for a robot to be ready."""
     if ENDING.is_set():
-        raise DeviceError('connecting was given up, as this process was told to end')
+        raise DeviceError('connecting was aborted, as this process was asked to end')
 
 
 def claim(resource: str, patience_s: float) -> int:
-    """Return a descriptor that locks a robot, by the name of what commands it; DeviceError if another process has it.
+    """Return a descriptor that locks a robot by its command interface; DeviceError if another process has it.
 
     The lock lasts until every process that inherited the descriptor has closed it or ended; `patience_s` is for the
     guard of a process that was killed.
@@ -353,24 +353,24 @@ def claim(resource: str, patience_s: float) -> int:
                 continue
             os.close(lock)
             raise DeviceError(
-                f'another process on this machine commands the arm ({resource}), or its guard still brings it to rest: '
-                f"it holds '{path}', and fuser names it; end it first"
+                f'another process on this machine commands the arm ({resource}), or its guard still stops it: '
+                f"it holds '{path}', and fuser names the process; end it first"
             ) from error
         return lock
 
 
 class GuardProcess:
-    """A process at a socket whose other end only the commanding process holds, and which may hold its lock, too.
+    """A process at a socket whose other end only the commanding process holds; it may also hold its lock.
 
-    The kernel closes that end however the process ends, also by SIGKILL; whoever ends in order says so first. The
-    socket is nobody's stdout, so that what a library prints there is no message.
+    The kernel closes that end at any end of the process, also by SIGKILL; a regular end is announced before. The
+    socket is no stdout, so that the output of a library is no message.
     """
 
     def __init__(self, module: str, *arguments: str, start: Sequence[str] = (), holds: Sequence[int] = ()) -> None:
         self.line, end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self.line.setblocking(False)
         with end:
-            # A session of its own: what ends all processes of a terminal or a launch file must not end the guard first.
+            # A separate session: what ends all processes of a terminal or a launch file must not end the guard first.
             self._process = subprocess.Popen(
                 [*start, sys.executable, '-m', module, str(end.fileno()), *arguments],
                 pass_fds=[end.fileno(), *holds],
@@ -386,7 +386,7 @@ class GuardProcess:
         return self._process.pid
 
     def dismiss(self) -> None:
-        """End the guard: the robot stands or has let go, or the line to it is gone."""
+        """End the guard: the robot is at rest or released, or the connection is lost."""
         with contextlib.suppress(OSError, subprocess.TimeoutExpired):  # of a guard that has ended
             self.line.send(DONE)
             self._process.wait(LEAVE_S)
@@ -396,22 +396,22 @@ class GuardProcess:
 
 
 def guard_socket() -> socket.socket:
-    """Return the guard's end of the line: the first argument of its process, which no signal of a terminal ends."""
+    """Return the guard's end of the socket: the first argument of its process, which no signal of a terminal ends."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_IGN)
-    with contextlib.suppress(OSError):  # who may not, is as fast as others
+    with contextlib.suppress(OSError):  # without the permission it keeps the usual priority
         os.setpriority(os.PRIO_PROCESS, 0, GUARD_NICENESS)
     return socket.socket(fileno=int(sys.argv[1]))
 
 
-GUARD_NICENESS = -10  # before whatever else keeps the machine busy
+GUARD_NICENESS = -10  # before other load of the machine
 
 
 # --------------------
-# Find out whether the finger is in free air, from the force while it rises.
+# Detect free air from the force while the finger rises.
 
 UNSTEADY = (
-    'its force sensor could not be zeroed: the force changed all the while the finger rose; see that nothing touches '
+    'its force sensor could not be zeroed: the force changed while the finger rose; check that nothing touches '
     "the finger, and raise 'zero_steady_n' above the noise of the sensor"
 )
 
@@ -432,11 +432,11 @@ class ZeroingParams:
 ZERO_RISE_M = 0.003  # through which a constant force proves free air; it notices contacts of zero_steady_n / 3 mm
 SMOOTHING_S = 0.02  # time constant over which the force is averaged: noise is no contact
 RISE_M_S = 0.02  # of an arm that looks for free air before it presses, as its force sensor is not zeroed
-MAX_RISES = 5.0  # it rises at most by so many times what proves free air
+MAX_RISES = 5.0  # highest rise, as a multiple of the rise that proves free air
 
 
 class FreeAir:
-    """Tell whether nothing touches the finger, whatever the offset of its force sensor.
+    """Detect free air, independent of the offset of the force sensor.
 
     In contact the force changes while the finger rises: a stiffness k times the rise. Free air is proven by a rise
     through which the force stays the same, and until the force changes again. So a contact of at least
@@ -454,16 +454,16 @@ class FreeAir:
         self.proven = False
 
     def presume_contact(self) -> None:
-        """Forget the proof: the finger was pressed on something, or nobody looked."""
+        """Discard the proof: the finger was pressed on something, or was not observed."""
         self._start = None
         self._force_n = math.nan
         self.proven = False
 
     def update(self, time_ns: int, position: Vector, force_n: float) -> bool:
-        """Take note of a state of the arm in the frame of the surface, and return whether free air is proven."""
+        """Note a state of the arm in the frame of the surface, and return whether free air is proven."""
         self._smooth(time_ns, force_n)
         start = self._start
-        # Written so that NaN is a change too.
+        # Written so that NaN also counts as a change.
         if start is None or not abs(self._force_n - self._start_n) <= self._steady_n:
             self._restart(position)
         elif not self.proven:
@@ -471,7 +471,7 @@ class FreeAir:
         return self.proven
 
     def seek(self, height_m: float | None) -> bool:
-        """Return whether the finger has risen in search of free air for too long; None if it does not search."""
+        """Return whether the rise in search of free air takes too long; None without a search."""
         if height_m is None:
             self._sought_from_m = None
             return False
@@ -500,16 +500,16 @@ class FreeAir:
 # --------------------
 # Zero a force sensor that cannot do so itself: in free air, at rest.
 
-CALM_NS = 100_000_000  # an arm with lag may still move so long after it was told to stand still
+CALM_NS = 100_000_000  # an arm with lag may still move this long after a stop
 AVERAGED_NS = 100_000_000  # of readings whose mean becomes the zero
 READINGS = 200
 
 
 class ForceZero:
-    """Remember what the sensor shows in free air.
+    """Keep the reading of the sensor in free air.
 
     Free air is proven by a rise through which the force stays the same (`texture_exploration.arms.arm`). At rest after
-    such a rise the mean of the readings becomes the new zero; any contact, and any command to press, asks for a new
+    such a rise the mean of the readings becomes the new zero; any contact, and any command to press, requires a new
     rise first.
     """
 
@@ -522,12 +522,12 @@ class ForceZero:
         self.zeroings = 0
 
     def forget(self) -> None:
-        """The sensor or the arm was lost for a while: nothing is known any more."""
+        """The sensor or the arm was lost for a while: discard all proofs."""
         self.zeroed = False
         self.presume_contact()
 
     def presume_contact(self) -> None:
-        """The finger presses, or was told to: the next zero needs another rise."""
+        """The finger presses, or was commanded to: the next zero needs another rise."""
         self.air.presume_contact()
         self._rest_ns = None
         self._readings.clear()
@@ -556,19 +556,19 @@ class ForceZero:
 # --------------------
 # Whether the finger is at rest, by its pose alone.
 
-REST_NS = 200_000_000  # over which it is looked at
+REST_NS = 200_000_000  # over which rest is decided
 REST_POSES = 4  # at least
 RESTING_M = 3e-5  # between the mean places of both halves of that time: slower than 0.3 mm/s, above the noise of a pose
 
 
 class RestWatch:
-    """Tell whether the pose has shown rest since it was last asked to forget: nobody leaves an arm before."""
+    """Detect rest by the pose since the last `forget`: an arm is not left before."""
 
     def __init__(self) -> None:
         self.forget()
 
     def forget(self) -> None:
-        """The arm was told to move, or nothing was heard for a while."""
+        """The arm was commanded to move, or no pose arrived for a while."""
         self.at_rest = False
         self._poses: deque[tuple[int, Vector]] = deque()
 

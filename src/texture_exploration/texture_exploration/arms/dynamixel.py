@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Hands with Dynamixel motors: the bus, the hand, and the process that takes torque off when its parent dies."""
+"""Hands with Dynamixel motors: the bus, the hand, and the process that switches the torque off when its parent dies."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ from texture_exploration.safety import CommandLimits
 # --------------------
 # Motors on a Dynamixel bus, in physical units, through the unmodified dynamixel-sdk.
 #
-# Its calls leave `is_using` set when they fail: one thread alone may use a bus, and after an error the port is made
-# again. Its reception is a busy loop; a port that waits a little for bytes makes it sleep, and leaves Python's lock to
-# others.
+# Its calls leave `is_using` set when they fail: only one thread may use a bus, and after an error the port is opened
+# again. Its reception is a busy loop; a port that waits a little for bytes makes it sleep and releases Python's lock
+# for other threads.
 
 # An unplugged port raises termios.error from tcflush, which is no OSError.
 LINE_FAULTS = (serial.SerialException, OSError, termios.error, TypeError, AttributeError)
@@ -55,8 +55,8 @@ FIRMWARE = 6  # address of its version, of one byte, in all control tables of pr
 TRIPPED = 0xFF  # the register of the Bus Watchdog after it has stopped the motor
 RESTART_S = 3.0  # a motor has rebooted within
 SILENT = 'does not answer'
-GARBLED = 'answers with what cannot be read: is its id given to two motors, or the cable damaged?'
-RESET = 'has lost its torque: it was reset, as by a dip of its supply'
+GARBLED = 'answers with data that cannot be read: do two motors have this id, or is the cable damaged?'
+RESET = 'has lost its torque: it was reset, for example by a voltage drop'
 REMEDY = "; when it has cooled and nothing blocks it, reboot it (service '~/reboot') or switch its power off and on"
 HARDWARE_ERRORS = {0: 'input voltage', 2: 'overheating', 3: 'encoder', 4: 'electrical shock', 5: 'overload'}
 
@@ -70,14 +70,14 @@ class MotorState(NamedTuple):
 
 
 class NoAnswer(DeviceError):
-    """A motor that fell silent while it was told something."""
+    """A motor that did not answer a write."""
 
 
 def _locked(device: str) -> int:
     """Return a descriptor that holds a lock on a device; OSError if another program has it.
 
-    Two programs on one bus would take each other's answers, and let each other's motors go. The SDK empties the input
-    buffer as it opens the port, answers to another program included; so the lock is taken before.
+    Two programs on one bus would read each other's answers and release each other's motors. The SDK empties the input
+    buffer when it opens the port, with answers to another program; so the lock is taken before.
     """
     descriptor = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
     try:
@@ -102,7 +102,7 @@ class DynamixelBus:
         self.missing: set[int] = set()
         self.limits_a: dict[int, float] = {}
         self.deaf: set[int] = set()  # motors whose watchdog may not stop them
-        self._reasons: dict[int, str] = {}  # why a motor is missing, where that is not silence
+        self._reasons: dict[int, str] = {}  # why a motor is missing, unless it is silent
         self._energised: set[int] = set()
         self._goal_currents: dict[int, int] = {}  # as sent last
         self._device = device
@@ -135,8 +135,8 @@ class DynamixelBus:
             self.lock = -1
 
     def start(self) -> None:
-        """Find and check the motors, set mode and gains; only when all is well, let them hold where they are."""
-        self.torque_off(self._profile.ids)  # a program before may have left it on
+        """Find and check the motors, set mode and gains; only without an error let them hold their position."""
+        self.torque_off(self._profile.ids)  # an earlier program may have left it on
         self.missing = set(self._profile.ids)
         found = [motor for motor in self._profile.ids if any(self._prepare(motor) for _ in range(TRIES))]
         if not found:
@@ -150,7 +150,7 @@ class DynamixelBus:
             self._energise(motor)
 
     def look_for(self, motor: int) -> bool:
-        """Take a motor in if it answers and is well; return whether that is so."""
+        """Add a motor if it answers without an error; return whether it was added."""
         try:
             if not self._prepare(motor):
                 return False
@@ -158,12 +158,12 @@ class DynamixelBus:
                 self._reasons[motor] = error
                 return False
             self._energise(motor)
-        except NoAnswer:  # a loose contact: no reason to let the others go
+        except NoAnswer:  # a loose contact: no reason to release the others
             return False
         return True
 
     def why_missing(self, motor: int) -> str:
-        """Return in words why a motor is missing."""
+        """Return why a motor is missing, as text."""
         return self._reasons.get(motor) or f'{self._profile.owner(motor)} {SILENT}'
 
     def _prepare(self, motor: int) -> bool:
@@ -177,7 +177,7 @@ class DynamixelBus:
             if self._garbled:
                 self._reasons[motor] = f'{profile.owner(motor)} {GARBLED}'
             return False
-        if model not in profile.models:  # or a late answer to an earlier question was taken for one to this
+        if model not in profile.models:  # or it is a late answer to an earlier request
             model, result = self._ping(motor)
             if result != SUCCESS:
                 return False
@@ -212,7 +212,7 @@ class DynamixelBus:
         return True
 
     def _energise(self, motor: int) -> None:
-        """Arm the motor's watchdog, then switch its torque on: it holds where it is."""
+        """Arm the motor's watchdog, then switch its torque on: it holds its position."""
         if self._profile.watchdog:
             self._arm(motor, 'bus_watchdog', self._profile.watchdog)
         self.write(motor, 'torque_enable', 1)
@@ -220,14 +220,14 @@ class DynamixelBus:
         self.missing.discard(motor)
 
     def _arm(self, motor: int, register: str, value: int) -> None:
-        """Write a register that bounds the force, and read it back: a motor may confirm what it does not keep."""
+        """Write a register that bounds the force, and read it back: a motor may confirm a value without storing it."""
         self.write(motor, register, value)
         kept = self.read_register(motor, register)
         if kept is None:
-            raise NoAnswer(f"{self._profile.owner(motor)} did not tell '{register}': it {SILENT}")
+            raise NoAnswer(f"{self._profile.owner(motor)} did not report '{register}': it {SILENT}")
         if kept != value:
             raise DeviceError(
-                f"{self._profile.owner(motor)} was told {value} for '{register}' and holds {kept}: what bounds its "
+                f"{self._profile.owner(motor)} was given {value} for '{register}' and holds {kept}: what bounds its "
                 f"force is not armed; update its firmware, or correct the table of the profile '{self._profile.name}'"
             )
 
@@ -253,7 +253,7 @@ class DynamixelBus:
                 )
 
     def read(self) -> dict[int, MotorState]:
-        """Return what all motors measure, {} if a cycle is lost; who does not answer is moved to `missing`."""
+        """Return the measurements of all motors, {} if a cycle is lost; a silent motor is moved to `missing`."""
         asked = [motor for motor in self._profile.ids if motor not in self.missing]
         measured: dict[int, MotorState] = {}
         with self._line():
@@ -265,7 +265,7 @@ class DynamixelBus:
                 measured[motor] = self._measured(data)
         if result == SUCCESS:
             return measured
-        # They answer in turn: the first that is silent hides all that come after it.
+        # They answer in turn: a silent motor hides all after it.
         silent = next(motor for motor in asked if motor not in measured)
         if not self._answers(silent):
             self.missing.add(silent)
@@ -283,12 +283,12 @@ class DynamixelBus:
         )
 
     def torque_off(self, motors: Iterable[int]) -> None:
-        """Let motors go, also those that do not answer: they may hear."""
+        """Release motors, also those that do not answer: they may still receive."""
         self._energised.difference_update(motors)
         self._sync_write('torque_enable', dict.fromkeys(motors, 0))
 
     def torque_off_packet(self) -> bytes:
-        """Return the instruction packet (sync write, protocol 2.0) that lets all motors go, for who has no SDK."""
+        """Return the instruction packet (sync write, protocol 2.0) that releases all motors without the SDK."""
         address, _ = self._profile.table['torque_enable']
         params = address.to_bytes(2, 'little') + b'\x01\x00' + b''.join(bytes([m, 0]) for m in self._profile.ids)
         body = bytes([SYNC_WRITE]) + params
@@ -296,8 +296,8 @@ class DynamixelBus:
         return packet + self._packets.updateCRC(0, packet, len(packet)).to_bytes(2, 'little')
 
     def let_go(self) -> None:
-        """Let all motors go and see that they did, as far as they can be reached; raises nothing that a line does."""
-        self._port.is_using = False  # whatever was interrupted
+        """Release all motors and verify it, as far as they can be reached; raises no error of the line."""
+        self._port.is_using = False  # a call may have been interrupted
         with contextlib.suppress(DeviceError):
             for _ in range(TRIES):
                 self.torque_off(self._profile.ids)
@@ -306,7 +306,7 @@ class DynamixelBus:
                     return
 
     def check_next(self) -> str:
-        """Look after one motor, another one with each call; return in words what it reports, '' if nothing."""
+        """Check one motor, another one with each call; return its error as text, '' if there is none."""
         present = [motor for motor in self._profile.ids if motor not in self.missing]
         if not present:
             return ''
@@ -314,7 +314,7 @@ class DynamixelBus:
         self._turn += 1
         data, result = self._read_block(motor, *self._health)
         if result != SUCCESS:
-            return ''  # that it is silent is noticed elsewhere
+            return ''  # silence is detected elsewhere
 
         def value(register: str) -> int:
             address, size = self._profile.table[register]
@@ -328,30 +328,30 @@ class DynamixelBus:
             return ''
         if value('bus_watchdog') == TRIPPED:
             raise DeviceError(
-                f'{owner} heard nothing for {self._profile.watchdog_s:g} s, and its watchdog stopped it: the computer '
-                'or the bus was held up; all motors were let go'
+                f'{owner} got no message for {self._profile.watchdog_s:g} s, and its watchdog stopped it: the '
+                'computer or the bus was delayed; all motors were released'
             )
         if not value('torque_enable') or (watchdog and value('bus_watchdog') != watchdog):
             self._reasons[motor] = f'{owner} {RESET}'
             self._energised.discard(motor)
             self.missing.add(motor)
         elif signed(value('goal_current'), 2) != self._goal_currents[motor]:
-            # Nobody answers to what is sent to all motors at once. Lost on the way, or refused: then this tells why.
+            # A sync write is not answered. Lost or refused: this finds the reason.
             self.write(motor, 'goal_current', self._goal_currents[motor])
         return ''
 
     def hardware_error(self, motor: int) -> str:
-        """Return in words which hardware error a motor reports and what to do, '' if none."""
+        """Return the hardware error of a motor and the remedy as text, '' if there is none."""
         bits = self.read_register(motor, 'hardware_error')
         return f'{self._profile.owner(motor)} reports {_reasons(bits)}{REMEDY}' if bits else ''
 
     def _counts(self, motor: int, current_a: float) -> int:
-        """Return a current in counts, no more than the motor takes: it would refuse the whole command."""
+        """Return a current in counts, limited to the range of the motor, which would refuse the whole command."""
         limit_a = self.limits_a[motor]
         return round(min(limit_a, max(-limit_a, current_a)) / self._profile.current_a)
 
     def write(self, motor: int, register: str, value: int) -> None:
-        """Write one register, and see that it was taken."""
+        """Write one register, and check that it was accepted."""
         address, size = self._profile.table[register]
         send = {1: 'write1ByteTxRx', 2: 'write2ByteTxRx', 4: 'write4ByteTxRx'}[size]
         for _ in range(TRIES):
@@ -361,11 +361,11 @@ class DynamixelBus:
                 break
         if result != SUCCESS:
             why = self._packets.getTxRxResult(result)
-            raise NoAnswer(f"{self._profile.owner(motor)} did not take '{register}': {why}")
-        # The highest bit only tells that there is a hardware error, which is asked for by itself.
+            raise NoAnswer(f"{self._profile.owner(motor)} did not accept '{register}': {why}")
+        # The highest bit only reports that there is a hardware error, which is read separately.
         if error & 0x7F:
             why = self._packets.getRxPacketError(error & 0x7F)
-            raise DeviceError(f"{self._profile.owner(motor)} did not take '{register}': {why}")
+            raise DeviceError(f"{self._profile.owner(motor)} did not accept '{register}': {why}")
 
     def read_register(self, motor: int, register: str) -> int | None:
         """Return one register, signed if it is longer than a byte; None if the motor does not answer."""
@@ -385,10 +385,10 @@ class DynamixelBus:
             return self._receive(motor, size) if result == SUCCESS else (b'', result)
 
     def _receive(self, motor: int, size: int) -> tuple[bytes, int]:
-        """Return the `size` bytes that a motor answers next, and the result of the SDK; what is no such answer goes by.
+        """Return the `size` bytes that a motor answers next, and the result of the SDK; other packets are skipped.
 
         The SDK cuts its data out of any packet of the motor, whether it is too long or too short. The late answer to an
-        earlier question, such as a ping or how the motor is, would be taken for a position or a current limit.
+        earlier request, such as a ping or a status, would be read as a position or a current limit.
         """
         result = SUCCESS
         while result == SUCCESS:
@@ -401,11 +401,11 @@ class DynamixelBus:
 
     def _answers(self, motor: int) -> bool:
         with self._line():
-            # That all were asked at once was the first try.
+            # The read of all motors was the first try.
             return any(self._packets.ping(self._port, motor)[1] == SUCCESS for _ in range(TRIES - 1))
 
     def _ping(self, motor: int) -> tuple[int, int]:
-        """Return the model number that a motor tells, and the result of the SDK."""
+        """Return the model number of a motor, and the result of the SDK."""
         with self._line():
             model, result, _ = self._packets.ping(self._port, motor)
         return model, result
@@ -431,7 +431,7 @@ class DynamixelBus:
             group.addParam(motor, list((value % (1 << 8 * size)).to_bytes(size, 'little')))
         with self._line():
             if values and group.txPacket() != SUCCESS:
-                raise DeviceError(f"device '{self._device}' did not take an order; no other program may use it")
+                raise DeviceError(f"device '{self._device}' did not accept a command; no other program may use it")
 
     @contextlib.contextmanager
     def _line(self) -> Iterator[None]:
@@ -446,7 +446,7 @@ class DynamixelBus:
 
 
 def _reasons(bits: int) -> str:
-    """Return the bits of the register Hardware Error Status in words."""
+    """Return the bits of the register Hardware Error Status as text."""
     known = [text for bit, text in HARDWARE_ERRORS.items() if bits >> bit & 1]
     return ' and '.join(known) or f'hardware error {bits:#04x}'
 
@@ -459,7 +459,7 @@ def signed(value: int, size: int) -> int:
 # --------------------
 # A process that switches the torque of the motors off when the process that commanded them is gone.
 
-REPEATS = 5  # nobody answers a sync write; one may meet what was still on the line
+REPEATS = 5  # a sync write is not answered; one may collide with earlier bytes on the line
 PAUSE_S = 0.02
 
 
@@ -489,15 +489,15 @@ if __name__ == '__main__':
 # --------------------
 # A hand of Dynamixel motors in current-based position mode: the position leads, the current bounds the force.
 
-FIRST_STATE_S = 15.0  # some 15 questions to each motor, which take 16 ms each with a USB adapter as delivered
-COMMAND_S = 0.2  # a command holds so long
-CLOSING_M_S = 0.02  # a finger that shall press comes down so fast
-REACH_RAD = 0.3  # the goal of a pressing motor lies at most so far within the object
-SLACK_RAD = 0.2  # a goal runs away from a motor that is held up by at most so much
-SEARCH_S = 2.0  # one missing motor is looked for so often: it costs 34 ms of silence
+FIRST_STATE_S = 15.0  # some 15 requests to each motor, which take 16 ms each with a USB adapter as delivered
+COMMAND_S = 0.2  # time for which a command holds
+CLOSING_M_S = 0.02  # speed of a finger that comes down to press
+REACH_RAD = 0.3  # largest depth of the goal of a pressing motor within the object
+SLACK_RAD = 0.2  # largest distance between the goal and a blocked motor
+SEARCH_S = 2.0  # period of the search for one missing motor, which costs 34 ms
 LONGEST_STEP_S = 0.05
-RATE_CYCLES = 40  # the rate is measured over so many
-SLOW_SHARE = 0.7  # of the rate of the profile; a bus that makes less is told
+RATE_CYCLES = 40  # over which the rate is measured
+SLOW_FRACTION = 0.7  # of the rate of the profile, below which a warning is given
 LATENCY_FILE = '/sys/class/tty/{}/device/latency_timer'  # of adapters by FTDI, ms
 LIMITS = CommandLimits()
 NOT_CONNECTED = 'the hand is not connected; connect it first'
@@ -508,7 +508,7 @@ class DynamixelHand:
 
     A motor that is missing or reports an error is named in the fault of the state; the others go on. However the thread
     or the process ends, the torque is switched off: by the thread itself, by a `TorqueGuard` when the process is gone;
-    and if nobody speaks to the motors for the time in the profile, their Bus Watchdog stops them.
+    and without a message for the time in the profile, the Bus Watchdog of the motors stops them.
     """
 
     def __init__(
@@ -531,7 +531,7 @@ class DynamixelHand:
         self._thread: threading.Thread | None = None
 
     def connect(self) -> None:
-        """Open the bus and find the motors; the pose now is where the fingers begin."""
+        """Open the bus and find the motors; the present pose is the start of the fingers."""
         self.close()
         self._closing.clear()
         self._fresh.clear()
@@ -539,12 +539,12 @@ class DynamixelHand:
         self._thread = threading.Thread(target=self._run, name='dynamixel', daemon=True)
         self._thread.start()
         if not self._fresh.wait(FIRST_STATE_S) or self._failure:
-            failure = self._failure or f"the motors on '{self._device}' answer only in part; check the cables"
+            failure = self._failure or f"the motors on '{self._device}' answer only partly; check the cables"
             self.close()
             raise DeviceError(failure)
 
     def close(self) -> None:
-        """Let go: torque off, and close the bus."""
+        """Release: torque off, and close the bus."""
         self._closing.set()
         if self._thread is not None:
             self._thread.join()
@@ -569,15 +569,15 @@ class DynamixelHand:
         self._grip = dict(forces_n)
 
     def command(self, fingers: Sequence[str], command: ArmCommand) -> None:
-        """Follow from the next cycle on; what is refused makes these fingers stand still."""
+        """Follow from the next cycle on; a refused command stops these fingers."""
         if self._failure:
             raise DeviceError(self._failure)
         for name in fingers:
             self._check(name, command)
-        self._order(fingers, command)
+        self._command_motors(fingers, command)
 
     def reboot(self) -> str:
-        """Let go, reboot the motors that report a hardware error, and stay unconnected; return what was done."""
+        """Release, reboot the motors that report a hardware error, and stay unconnected; return what was done."""
         self.close()
         bus = DynamixelBus(self._device, self.profile)
         try:
@@ -586,19 +586,19 @@ class DynamixelHand:
             bus.close()
         self._failure = NOT_CONNECTED
         if not rebooted:
-            return 'no motor that answers reports an error; none was rebooted, and the hand let go'
-        return f'rebooted: {", ".join(map(self.profile.owner, rebooted))}; the hand let go, the next request connects'
+            return 'no motor that answers reports an error; none was rebooted, and the hand was released'
+        return f'rebooted: {", ".join(map(self.profile.owner, rebooted))}; released until the next request'
 
-    def _order(self, fingers: Sequence[str], command: ArmCommand) -> None:
+    def _command_motors(self, fingers: Sequence[str], command: ArmCommand) -> None:
         for name in fingers:
             self._commands[name] = (command, time.monotonic())
 
     def _check(self, name: str, command: ArmCommand) -> None:
-        """Refuse what exceeds the limits of commands or the current that the motor takes."""
-        self._limits.check(command, lambda: self._order([name], STANDSTILL))
+        """Refuse a command beyond its limits or beyond the current of the motor."""
+        self._limits.check(command, lambda: self._command_motors([name], STANDSTILL))
         highest_n = self._highest_n(name)
         if command.force_n is not None and command.force_n > highest_n:
-            self._order([name], STANDSTILL)
+            self._command_motors([name], STANDSTILL)
             raise CommandRefused(
                 f'the command was refused and {name} stopped: the force is {command.force_n:g} N, and the Current '
                 f'Limit of its motor allows {highest_n:.3g} N; ask for less, or raise that limit with DYNAMIXEL Wizard'
@@ -622,7 +622,7 @@ class DynamixelHand:
             self._failure = str(error)
         except BaseException as error:
             # Also an error of this program must neither leave the motors pressing nor pass in silence.
-            self._failure = f'the hand was let go after an error in its program ({type(error).__name__}: {error})'
+            self._failure = f'the hand was released after an error in its program ({type(error).__name__}: {error})'
             raise
         finally:
             if bus is not None:
@@ -666,7 +666,7 @@ class DynamixelHand:
             self._warning = self._slowness(cycles)
 
     def _doubtful(self, deaf: Iterable[int]) -> str:
-        """Return what to say of motors whose watchdog may not stop them, '' if there are none."""
+        """Return a warning about motors whose watchdog may not stop them, '' if there are none."""
         numbers = ', '.join(map(str, sorted(deaf)))
         if not numbers or not self.profile.watchdog:
             return ''
@@ -676,11 +676,11 @@ class DynamixelHand:
         )
 
     def _slowness(self, cycles: Sequence[float]) -> str:
-        """Return what to say of the rate of the cycles that began at these times, '' if they are fast enough."""
+        """Return a warning about the rate of the cycles that began at these times, '' if they are fast enough."""
         if len(cycles) < RATE_CYCLES:
             return self._warning
         rate_hz = (len(cycles) - 1) / (cycles[-1] - cycles[0])
-        if rate_hz >= SLOW_SHARE * self.profile.rate_hz:
+        if rate_hz >= SLOW_FRACTION * self.profile.rate_hz:
             return ''
         latency = Path(LATENCY_FILE.format(Path(self._device).resolve().name))
         adapter = f' (now {latency.read_text().strip()} ms)' if latency.is_file() else ''
@@ -730,11 +730,11 @@ class DynamixelFinger:
         self._pressing = False
 
     def measure(self, motors: Mapping[int, MotorState]) -> None:
-        """Take what the motors measure; one that is missing keeps its last, and begins where it is when it is back."""
+        """Take the measurements of the motors; a missing one keeps its last, and resumes at its position."""
         for role, joint in self._joints.items():
             motor = motors.get(joint.id)
             if motor is None:
-                self._goal.pop(role, None)  # of before it sagged or was turned: it would snap there
+                self._goal.pop(role, None)  # outdated goal, to which it would jump
             else:
                 self._motors[role] = motor
                 self._start.setdefault(role, motor.position_rad)

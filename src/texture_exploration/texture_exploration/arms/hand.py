@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What a hand is to the explorer: profiles, models of force, finger sets, and a simulated hand."""
+"""Interface of a hand to the explorer: profiles, models of force, finger sets, and a simulated hand."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from texture_exploration.arms.simulated import RATE_HZ, SimulatedArm, SimulatedA
 from texture_exploration.safety import CommandLimits
 
 # --------------------
-# Dynamixel models by number: what a count of current is, and how much torque a current makes.
+# Dynamixel models by number: current per count, and torque per current.
 #
 # Torque per current is stall torque by stall current at the recommended voltage. Source: ROBOTIS e-Manual, table
 # Specifications and registers Model Number and Present Current of each model.
@@ -59,7 +59,7 @@ GOES_ON_TO = 51  # firmware of size 330 to this reports that the Bus Watchdog ha
 def goes_on(model: int, firmware: int) -> bool:
     """Return whether a motor is known to move on after its Bus Watchdog has tripped.
 
-    Source: forum.robotis.com, topic 4814 (in current control; other modes were not told).
+    Source: forum.robotis.com, topic 4814 (in current control; other modes were not reported).
     """
     return model in SIZE_330 and firmware <= GOES_ON_TO
 
@@ -73,22 +73,22 @@ def differs(model: int, current_a: float, torque_nm_a: float) -> str:
     """Return how a model's torque per count departs from that of given scales, '' if it does not, or is unknown."""
     if model not in MODELS:
         return ''
-    own = MODELS[model]
-    count_nm = own.current_a * own.torque_nm_a
+    scale = MODELS[model]
+    count_nm = scale.current_a * scale.torque_nm_a
     if abs(current_a * torque_nm_a / count_nm - 1) <= TOLERANCE:
         return ''
     return (
-        f'model {describe(model)} makes {own.torque_nm_a:.2f} N·m/A at {own.current_a * 1000:g} mA per count, and the '
-        f'profile says {torque_nm_a:g} N·m/A at {current_a * 1000:g} mA per count'
+        f'model {describe(model)} makes {scale.torque_nm_a:.2f} N·m/A at {scale.current_a * 1000:g} mA per count, and '
+        f'the profile says {torque_nm_a:g} N·m/A at {current_a * 1000:g} mA per count'
     )
 
 
 # --------------------
-# What every hand can do: hold with some fingers, and move others as arms move theirs.
+# Interface of every hand: hold with some fingers, and move others as an arm does.
 
 
 class Fingertip(NamedTuple):
-    """Position, velocity and force of one fingertip, in the frame of its own patch of the object; see `ArmState`."""
+    """Position, velocity and force of one fingertip, in the frame of its patch of the object; see `ArmState`."""
 
     position: Vector
     velocity: Vector
@@ -119,22 +119,22 @@ class Hand(Protocol):
         """Reach the hand and clear its faults; may be called again after `close`."""
 
     def close(self) -> None:
-        """Let everything go; never raises, may be called twice."""
+        """Release all fingers; never raises, may be called twice."""
 
     def state(self) -> HandState:
         """Return the newest state at once."""
 
     def grip(self, forces_n: Mapping[str, float]) -> None:
-        """Let fingers press with these forces from now on, whatever else is commanded; CommandRefused as `command`."""
+        """Press with these forces from now on, independent of other commands; CommandRefused as `command`."""
 
     def command(self, fingers: Sequence[str], command: ArmCommand) -> None:
         """Let fingers follow a command; it holds for a fraction of a second. CommandRefused if it exceeds limits."""
 
     def warning(self) -> str:
-        """Return in a sentence what is not as it should be although the hand moves, '' if nothing."""
+        """Return a warning in a sentence although the hand moves, '' if there is none."""
 
     def reboot(self) -> str:
-        """Let go, reboot what reports an error, stay unconnected; return in words what was done, or DeviceError."""
+        """Release, reboot motors that report an error, stay unconnected; return what was done, or DeviceError."""
 
 
 # --------------------
@@ -142,7 +142,7 @@ class Hand(Protocol):
 
 ROLES = ('press', 'across', 'along')
 WATCHDOG_UNIT_S, MAX_WATCHDOG = 0.02, 127  # the register counts by these
-# Lowest and highest of every number: what motors of this kind have, with room. A number beyond is a slip of the pen,
+# Lowest and highest of every number: the range of these motors, with a margin. A number beyond is a typing error,
 # and the motors would press with it.
 RANGES: Mapping[str, tuple[float, float]] = {
     'model': (0, 65535),
@@ -174,9 +174,9 @@ class Joint(NamedTuple):
 
 @dataclass(frozen=True)
 class Profile:
-    """What a profile file says; registers are (address, bytes).
+    """Content of a profile file; registers are (address, bytes).
 
-    `watchdog_s` is how long the motors go on without hearing anything; 0: for ever.
+    `watchdog_s` is how long the motors continue without a message; 0: without limit.
     """
 
     name: str
@@ -207,11 +207,11 @@ class Profile:
 
     @property
     def watchdog(self) -> int:
-        """What the register of the Bus Watchdog is set to."""
+        """Value of the register of the Bus Watchdog."""
         return round(self.watchdog_s / WATCHDOG_UNIT_S)
 
     def owner(self, motor: int) -> str:
-        """Return what a motor does, in words."""
+        """Return the role of a motor as text."""
         for name, finger in self.fingers.items():
             for role, joint in finger.items():
                 if joint.id == motor:
@@ -234,7 +234,7 @@ def load_profile(name_or_path: str) -> Profile:
 
 
 def read_profile(content: Mapping[str, Any], name: str) -> Profile:
-    """Return the profile in what a file holds; raises as `load_profile`."""
+    """Return the profile in the content of a file; raises as `load_profile`."""
     where = f"hand profile '{name}'"
     missing = [register for register in X_SERIES if register not in content['table']]
     if missing:
@@ -262,10 +262,10 @@ def read_profile(content: Mapping[str, Any], name: str) -> Profile:
     if profile.watchdog_s != 0 and not 1 <= profile.watchdog_s / WATCHDOG_UNIT_S <= MAX_WATCHDOG:
         raise InvalidParameter(
             f'{where}: watchdog_s is {profile.watchdog_s:g} s; allowed are {WATCHDOG_UNIT_S:g} to '
-            f'{MAX_WATCHDOG * WATCHDOG_UNIT_S:g} s, and 0, with which the motors press on when nobody commands them'
+            f'{MAX_WATCHDOG * WATCHDOG_UNIT_S:g} s, and 0, with which the motors keep pressing without commands'
         )
     if len(set(profile.ids)) != len(profile.ids):
-        raise InvalidParameter(f'{where}: a motor is named twice; each has one place')
+        raise InvalidParameter(f'{where}: a motor is named twice; each has one role')
     return profile
 
 
@@ -285,17 +285,17 @@ def _check_numbers(profile: Profile, where: str) -> None:
 
 
 def _check_models(profile: Profile, where: str) -> None:
-    """Refuse motors for which the torque of the profile is wrong: they would press harder or softer than asked."""
+    """Refuse motors for which the torque of the profile is wrong: they would press harder or softer than requested."""
     for model in profile.models:
         for register, place in profile.table.items():
             if model in MODELS and place != X_SERIES.get(register, place):
                 raise InvalidParameter(
-                    f"{where}: '{register}' stands at {list(place)} in the table; motors of model {describe(model)} "
-                    f'have it at {list(X_SERIES[register])}, and what protects would not be armed'
+                    f"{where}: '{register}' is at {list(place)} in the table; motors of model {describe(model)} "
+                    f'have it at {list(X_SERIES[register])}, and the protection would not be armed'
                 )
         if difference := differs(model, profile.current_a, profile.torque_nm_a):
             raise InvalidParameter(
-                f'{where}: {difference}; give each model a profile of its own, with its current_a and torque_nm_a'
+                f'{where}: {difference}; give each model a separate profile, with its current_a and torque_nm_a'
             )
 
 
@@ -322,7 +322,7 @@ LIMITS = CommandLimits()
 
 
 class SimulatedHand:
-    """Each finger is a simulated arm of its own; see `texture_exploration.arms.hand.Hand`."""
+    """Each finger is a separate simulated arm; see `texture_exploration.arms.hand.Hand`."""
 
     finger_sets: Mapping[str, FingerSet] = FINGER_SETS
 
@@ -352,7 +352,7 @@ class SimulatedHand:
             self._thread.start()
 
     def close(self) -> None:
-        """Let go and end the thread."""
+        """Release and end the thread."""
         self._grip = {}
         self._closing.set()
         if self._thread is not None:
@@ -382,7 +382,7 @@ class SimulatedHand:
         self._send(fingers, command)
 
     def warning(self) -> str:
-        """Nothing ever is amiss that `state` does not tell."""
+        """Return no warning: `state` reports all faults."""
         return ''
 
     def reboot(self) -> str:

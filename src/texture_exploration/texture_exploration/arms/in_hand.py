@@ -16,14 +16,14 @@ from texture_exploration.arms.dynamixel import DynamixelHand
 from texture_exploration.arms.hand import FingerSet, Fingertip, Hand, SimulatedHand
 from texture_exploration.safety import CommandLimits
 
-HELD_SHARE = 0.8  # of the wanted force: a finger that presses with it holds the object
-LOST_SHARE = 0.5  # one that presses less has lost it
+HELD_FRACTION = 0.8  # of the wanted force: a finger that presses with it holds the object
+LOST_FRACTION = 0.5  # one that presses less has lost it
 SAMPLE_PERIOD_S = 0.01
 
 
 @dataclass(frozen=True)
 class InHandParams(CommandLimits):
-    """Which hand holds what how."""
+    """Parameters of the hand and of its grip."""
 
     hand: str = param('simulated', "Hand that is used: 'simulated' or 'dynamixel'.", choices=('simulated', 'dynamixel'))
     finger_set: str = param('kaboli-train', 'Finger set of the hand: which fingers hold and which slide.')
@@ -36,7 +36,7 @@ class InHandParams(CommandLimits):
     torque_off_on_fault: bool = param(
         False, 'Switches the torque off, which releases the object, when a motor of a Dynamixel hand reports a fault.'
     )
-    finger_pipe: str = param('', "Named pipe on which the emulator is told where the finger is; '' tells nobody.")
+    finger_pipe: str = param('', "Named pipe for the finger position that the emulator reads; '' for none.")
 
 
 HANDS: Mapping[str, Callable[[InHandParams], Hand]] = {
@@ -74,7 +74,7 @@ class InHandArm(Arm):
             raise
 
     def close(self) -> None:
-        """Let go."""
+        """Release the object."""
         self._connected = False
         self.hand.close()
         self._emulator.close()
@@ -91,7 +91,7 @@ class InHandArm(Arm):
             raise DeviceError('the hand is not connected; connect it first')
         hand = self.hand.state()
         tips = [hand.fingers[name] for name in self.fingers.slide]
-        weak = self._weak(LOST_SHARE)
+        weak = self._weak(LOST_FRACTION)
         state = ArmState(
             time_ns=hand.time_ns,
             position=_mean([tip.position for tip in tips]),
@@ -118,7 +118,7 @@ class InHandArm(Arm):
         self.hand.command(self.fingers.slide, command)
 
     def stop(self) -> None:
-        """Let the sliding fingers stand still; the others hold on."""
+        """Stop the sliding fingers; the others keep holding."""
         self.command(ArmCommand())
 
     def warning(self) -> str:
@@ -126,7 +126,7 @@ class InHandArm(Arm):
         return self.hand.warning()
 
     def reboot(self) -> str:
-        """Let go and reboot the motors that report an error; the arm is not connected any more.
+        """Release the object and reboot the motors that report an error; the arm is not connected any more.
 
         Raises
         ------
@@ -139,16 +139,16 @@ class InHandArm(Arm):
     def _take_hold(self) -> None:
         self.hand.grip(dict.fromkeys(self.fingers.hold, self._params.grip_force_n))
         end_s = time.monotonic() + self._params.grip_timeout_s
-        while weak := self._weak(HELD_SHARE):
+        while weak := self._weak(HELD_FRACTION):
             if time.monotonic() > end_s:
                 raise DeviceError(f'there is nothing to hold: {weak}; give the hand an object')
             time.sleep(SAMPLE_PERIOD_S)
 
-    def _weak(self, share: float) -> str:
+    def _weak(self, fraction: float) -> str:
         """Return which holding finger presses with less than a fraction of the wanted force, '' if none."""
         tips: Mapping[str, Fingertip] = self.hand.state().fingers
         wanted = self._params.grip_force_n
-        weak = [name for name in self.fingers.hold if tips[name].force_n < share * wanted]
+        weak = [name for name in self.fingers.hold if tips[name].force_n < fraction * wanted]
         return ', '.join(f'{name} presses with {tips[name].force_n:.2f} N of {wanted:g} N' for name in weak)
 
 

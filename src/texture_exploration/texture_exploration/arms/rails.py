@@ -23,9 +23,9 @@ from texture_exploration.arms.arm import Arm, ArmCommand, ArmState, Vector
 from texture_exploration.safety import CommandLimits
 
 # --------------------
-# Numbers of the rails and of the line to their microcontroller: the machine of Hu et al. 2014, frames of our own.
+# Numbers of the rails and of the line to their microcontroller: the machine of Hu et al. 2014, frames of this project.
 #
-# Orders and answers are frames of `texture_core.framing` with one row and one column, little endian:
+# Commands and answers are frames of `texture_core.framing` with one row and one column, little endian:
 #
 # | kind | direction | body |
 # |---|---|---|
@@ -37,7 +37,7 @@ from texture_exploration.safety import CommandLimits
 #
 # A state comes 100 times a second. Modes of the pressing motor: 0 it holds (it locks itself), 1 it moves at `value`
 # µm/s, positive away from the surface, 2 it presses until `value` mN are reached, and locks. A motor without an encoder
-# counts the way it was told to go.
+# counts the commanded distance.
 
 VERSION = 1
 MOVE, STOP, CLEAR, STATE = 0xA0, 0xA1, 0xA2, 0x20
@@ -45,7 +45,7 @@ HOLD, MOVING, PRESS = 0, 1, 2
 MOVE_BODY = Struct('<iiBi')
 STATE_BODY = Struct('<iiiiBH')
 STATE_PERIOD_S = 0.01
-WATCHDOG_S = 0.15  # so long an order holds
+WATCHDOG_S = 0.15  # time for which a command holds
 MICRO, MILLI = 1e6, 1e3
 
 # Flags of a state.
@@ -65,7 +65,7 @@ READ_S = 0.05
 
 @dataclass(frozen=True)
 class RailsParams(CommandLimits):
-    """Where the rails are, and what their encoders count."""
+    """Device of the rails, and the scale of their encoders."""
 
     device: str = param(f'{DEVICES}/rails', 'Path of the serial device of the rails; the default is the emulated one.')
     xy_counts_m: float = param(200_000.0, 'Encoder counts per metre of the rails.', unit='1/m', low=1e3, high=1e8)
@@ -156,7 +156,7 @@ class RailsArm(Arm):
         return self._state
 
     def command(self, command: ArmCommand) -> None:
-        """Send an order."""
+        """Send a command."""
         self._params.check(command, self.stop)
         vx, vy = (round(speed * MICRO) for speed in command.tangential_m_s)
         mode, value = MOVING, round(command.normal_m_s * MICRO)
@@ -167,7 +167,7 @@ class RailsArm(Arm):
         self._send(MOVE, MOVE_BODY.pack(vx, vy, mode, value))
 
     def stop(self) -> None:
-        """Let the rails stand still; the pressing motor locks."""
+        """Stop the rails; the pressing motor locks."""
         self._send(STOP)
 
     @property
@@ -199,7 +199,7 @@ class RailsArm(Arm):
                     self._take(frame)
 
     def _take(self, frame: Frame) -> None:
-        """Make a state of a frame; frames of other kinds are the finger's, on the same line."""
+        """Convert a frame to a state; frames of other kinds are those of the finger, on the same line."""
         if frame.kind != STATE:
             return
         if frame.version != VERSION or len(frame.body) != STATE_BODY.size:

@@ -52,13 +52,13 @@ class ControllerTopics(Protocol):
         """Return the newest force that came since the last call, None if none did."""
 
     def listeners(self) -> int:
-        """Return how many nodes listen to the commanded velocities."""
+        """Return the number of subscribers to the commanded velocities."""
 
     def unsafe(self) -> str:
-        """Return why the arm must not go on although it obeys: another commands it, or no guard would stop it."""
+        """Return why a motion must end although the arm obeys: another commands it, or no guard would stop it."""
 
     def beat(self, *, moving: bool) -> None:
-        """Tell the guard, in each period, that the commanding process lives, and whether the arm may still move."""
+        """Send the guard, in each period, a heartbeat and whether the arm may still move."""
 
     def send_velocity(self, velocity_m_s: Vector) -> None:
         """Command a velocity in the frame `twist_frame_id`."""
@@ -73,9 +73,9 @@ class ControllerTopics(Protocol):
         """Wait until what was sent has arrived, and leave; the guard stays until an arm that may still move rests."""
 
 
-COMMAND_HOLDS_S = 0.1  # without a new one, after which the arm stands: ten periods of the explorer
-RESTS_WITHIN_NS = 2_000_000_000  # that zero velocity is commanded; then somebody else moves the arm
-GONE_NS = 300_000_000  # a controller that nobody hears of for so long is lost; a shorter time may be one of discovery
+COMMAND_HOLDS_S = 0.1  # without a new one, after which the arm stops: ten periods of the explorer
+RESTS_WITHIN_NS = 2_000_000_000  # of zero velocity; an arm that still moves is moved by others
+GONE_NS = 300_000_000  # a controller that is not seen for this long is lost; a shorter gap may be due to discovery
 UNSEEN_NS = 100_000_000  # without a pose, after which it is not known whether the arm follows
 POLL_S = 0.005
 LOGGER = logging.getLogger(__name__)
@@ -98,9 +98,9 @@ def open_topics(params: RosControllersParams) -> ControllerTopics:
 class RosControllersArm(SurfaceArm):
     """An arm that ROS drives by a Cartesian velocity controller; see `texture_exploration.arms.arm.Arm`.
 
-    Zero velocity is commanded on every way out: a stop, a fault, a command that is too old, `close`, and by a process
-    of its own if this one is killed; and always until the pose shows rest. After a connection, and after each silence
-    of poses, forces or the controller, it is commanded first, whatever is asked for.
+    Zero velocity is commanded at every end: a stop, a fault, a command that is too old, `close`, and by a guard
+    process if this one is killed; and always until the pose shows rest. After a connection, and after each silence
+    of poses, forces or the controller, it is commanded first, before any other command.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ class RosControllersArm(SurfaceArm):
     open_topics
         Makes the topics when connecting.
     own_thread
-        Command by itself at `rate_hz` once connected. If False, whoever owns the arm calls `step`.
+        Command in a thread at `rate_hz` once connected. If False, the owner of the arm calls `step`.
     """
 
     Params = RosControllersParams
@@ -144,7 +144,7 @@ class RosControllersArm(SurfaceArm):
         self._restart()
 
     def check(self) -> None:
-        """Wait for the first pose, the first force and a controller that listens; nothing is commanded.
+        """Wait for the first pose, the first force and a controller that subscribes; nothing is commanded.
 
         Raises
         ------
@@ -158,7 +158,7 @@ class RosControllersArm(SurfaceArm):
             topics.close()
 
     def connect(self) -> None:
-        """Wait for the first pose, the first force and a controller that listens, and begin to command.
+        """Wait for the first pose, the first force and a controller that subscribes, and begin to command.
 
         Raises
         ------
@@ -230,7 +230,7 @@ class RosControllersArm(SurfaceArm):
     def recover(self) -> None:
         """Clear a fault; the force sensor is zeroed again before the next contact.
 
-        Whoever calls this has made sure that the arm may move.
+        The caller makes sure that the arm may move.
 
         Raises
         ------
@@ -303,12 +303,12 @@ class RosControllersArm(SurfaceArm):
             if fault != self._state.fault:  # once for one that stays, again and again as long as nothing comes
                 self._let_rest()
         self._state = replace(self._tool.state(fault), unsafe=self._unsafe)
-        self._zeroed = self._tool.zero.zeroed  # after the state, so that who reads it finds the zeroed force
+        self._zeroed = self._tool.zero.zeroed  # after the state, so that a reader finds the zeroed force
         self._carry_out(topics, self._due(now_ns), held_s)
         topics.beat(moving=not self._tool.rest.at_rest or self._pressing)
 
     def _begin(self) -> ControllerTopics:
-        """Let go of an earlier connection, and open the topics of a new one."""
+        """Close an earlier connection, and open the topics of a new one."""
         self.close()
         self._restart()
         return self._open_topics(self._params)
@@ -336,7 +336,7 @@ class RosControllersArm(SurfaceArm):
             self._switched, self._hand_over_fault = True, ''
 
     def _give_back(self, topics: ControllerTopics) -> None:
-        """Switch back what was switched; who let go cannot do more about it than to say so."""
+        """Switch the controllers back; a failure is only reported."""
         if not self._switched:
             return
         self._switched = False
@@ -346,7 +346,7 @@ class RosControllersArm(SurfaceArm):
             self._hand_over_fault = f'the controllers were not switched back: {error}'
 
     def doubt(self) -> str:
-        """Return in a sentence that the force comes too late to press by it, '' if not."""
+        """Return in a sentence that the force is too late for force control, '' if not."""
         return '' if self._params.target_wrench_topic else self._velocity.doubt()
 
     def warning(self) -> str:
@@ -365,9 +365,9 @@ class RosControllersArm(SurfaceArm):
             give_up_when_ending()
             self._take(topics, self._clock())
             missing = {
-                f"no pose comes on '{params.pose_topic}'": not tool.came_ns['pose'],
-                f"no force comes on '{params.wrench_topic}'": not tool.came_ns['force'],
-                f"nobody listens on '{params.twist_topic}'": topics.listeners() == 0,
+                f"no pose arrives on '{params.pose_topic}'": not tool.came_ns['pose'],
+                f"no force arrives on '{params.wrench_topic}'": not tool.came_ns['force'],
+                f"no node subscribes to '{params.twist_topic}'": topics.listeners() == 0,
             }
             faults = [what for what, is_missing in missing.items() if is_missing]
             if unsafe := topics.unsafe():
@@ -384,7 +384,7 @@ class RosControllersArm(SurfaceArm):
             time.sleep(POLL_S)
 
     def _take(self, topics: ControllerTopics, now_ns: int) -> None:
-        """Take over what came; the pose first, as it tells how the force is turned."""
+        """Take the new messages; the pose first, as the force is rotated by it."""
         pose = topics.newest_pose()
         if pose is not None:
             self._tool.take_pose(now_ns, pose)
@@ -398,13 +398,13 @@ class RosControllersArm(SurfaceArm):
         if topics.listeners() == 0:
             self._gone_ns = self._gone_ns or now_ns
             if now_ns - self._gone_ns > GONE_NS:
-                return f"nobody listens on '{topic}' any more: the controller has ended"
-            self._unsafe = self._unsafe or f"for a moment nobody listened on '{topic}'; see why its controller left"
+                return f"no node subscribes to '{topic}' any more: the controller has ended"
+            self._unsafe = self._unsafe or f"for a moment no node subscribed to '{topic}'; see its controller"
             self._follow.restart()
             self._let_rest()
             return ''
         self._gone_ns = 0
-        # The guard has commanded zero meanwhile; or nobody has seen the arm, as when its controller got no time.
+        # The guard has commanded zero meanwhile; or the arm was not observed, as its controller had no time.
         unseen = now_ns - self._tool.came_ns['pose'] > UNSEEN_NS
         if self._commanded == REST or held_s > HEARTBEAT_S or unseen:
             self._follow.restart()
@@ -413,13 +413,13 @@ class RosControllersArm(SurfaceArm):
         if not late:
             return ''
         reason = f"{late}: the controller on '{topic}' is not active or holds back, or something is in the way"
-        if self._unsafe or not self._follow.stood:  # nor did it follow the lift, or where it goes nobody knows
+        if self._unsafe or not self._follow.at_rest:  # nor did it follow the lift, or its motion is unknown
             return reason
-        self._unsafe = reason  # it may only have been held up: a lift is tried
+        self._unsafe = reason  # it may only have been delayed: a lift is tried
         return ''
 
     def _let_rest(self) -> None:
-        """Let the arm come to rest before it follows anything: something was silent, and what it does is not known."""
+        """Bring the arm to rest first: after a silence its motion is unknown."""
         self._tool.rest.forget()
         self._resting_first, self._halted_ns = True, 0
 
@@ -431,7 +431,7 @@ class RosControllersArm(SurfaceArm):
         if now_ns - self._halted_ns <= RESTS_WITHIN_NS:
             return ''
         return (
-            f"the arm moves although zero velocity is commanded on '{self._params.twist_topic}': see what else moves "
+            f"the arm moves although zero velocity is commanded on '{self._params.twist_topic}': check what else moves "
             'it, or whether this topic leads to its controller'
         )
 
@@ -445,7 +445,7 @@ class RosControllersArm(SurfaceArm):
         command = self._command
         if command is None or self._resting_first or (now_ns - command[1]) * 1e-9 > COMMAND_HOLDS_S:
             return None
-        if self._unsafe:  # the way out alone is open
+        if self._unsafe:  # only a lift is allowed
             up_m_s = 0.0 if command[0].force_n is not None else max(0.0, command[0].normal_m_s)
             return ArmCommand(normal_m_s=up_m_s)
         return self._lifted_first(command[0])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""An arm without a robot: a kinematic finger over an elastic surface; with a force mode of its own, or without."""
+"""An arm without a robot: a kinematic finger over an elastic surface; with or without a force mode."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from texture_exploration.force_control import ForceLoopParams
 from texture_exploration.safety import CommandLimits
 
 # --------------------
-# What lies under the simulated finger: an elastic surface with a tilt, a bump, a step, an edge or a soft layer.
+# Surface under the simulated finger: an elastic surface with a tilt, a bump, a step, an edge or a soft layer.
 
 STICK_M = 0.002  # way from slip to slip
 BUMP_FROM_M, BUMP_LENGTH_M = 0.02, 0.04
@@ -30,7 +30,7 @@ BASE_STIFFNESS_N_M = 20000.0  # below a soft layer, and of a wall: as of wood un
 
 @dataclass(frozen=True)
 class SurfaceShape:
-    """What force control is tried on; programs choose it, a plane is the default."""
+    """Shape for tests of force control; programs choose it, a plane is the default."""
 
     tilt_rad: float = 0.0  # by which it rises along x
     bump_m: float = 0.0  # height of a round bump on the path along x
@@ -57,8 +57,8 @@ class SimulatedSurface:
     def height_m(self, x_m: float) -> float:
         """Return the height of the untouched surface at x."""
         shape = self._shape
-        share = (x_m - BUMP_FROM_M) / BUMP_LENGTH_M
-        bump = 0.5 - 0.5 * math.cos(2 * math.pi * share) if 0 < share < 1 else 0.0
+        fraction = (x_m - BUMP_FROM_M) / BUMP_LENGTH_M
+        bump = 0.5 - 0.5 * math.cos(2 * math.pi * fraction) if 0 < fraction < 1 else 0.0
         step = shape.step_m if x_m >= shape.step_from_m else 0.0
         return x_m * math.tan(shape.tilt_rad) + shape.bump_m * bump + step
 
@@ -69,7 +69,7 @@ class SimulatedSurface:
             return 0.0
         depth = self.height_m(x_m) - z_m
         press = self._press_n(depth)
-        # A sticky surface comes along with the finger until it tears off.
+        # A sticky surface follows the finger until it comes off.
         self._sticking = depth > 0 or (self._sticking and press > -self._shape.adhesion_n)
         if not self._sticking:
             return 0.0
@@ -80,7 +80,7 @@ class SimulatedSurface:
         return -BASE_STIFFNESS_N_M * max(0.0, x_m - self._shape.wall_m)
 
     def _press_n(self, depth_m: float) -> float:
-        """Return the force of the spring, or of the soft layer and what is below it."""
+        """Return the force of the spring, or of the soft layer and the base below it."""
         layer_m = self._shape.layer_m
         if not layer_m or depth_m <= layer_m:
             return self._stiffness_n_m * depth_m
@@ -88,13 +88,13 @@ class SimulatedSurface:
 
 
 # --------------------
-# The arm: ideal, or with velocities that come into effect late.
+# The arm: ideal, or with velocities that take effect with a delay.
 
-HOLDS_S = 0.02  # so long an arm keeps a velocity when nobody asks for another
+HOLDS_S = 0.02  # time for which an arm keeps a velocity without a new command
 
 
 class DelayedVelocity:
-    """A velocity that comes into effect late, and holds for a short time only."""
+    """A velocity that takes effect with a delay, and holds for a short time only."""
 
     def __init__(self, delay_s: float, now_ns: int) -> None:
         self._delay_ns = round(delay_s * 1e9)
@@ -103,11 +103,11 @@ class DelayedVelocity:
         self._since_ns = self._done_ns = now_ns
 
     def ask(self, now_ns: int, velocity: Vector) -> None:
-        """Ask for a velocity, m/s."""
+        """Command a velocity, m/s."""
         self._coming.append((now_ns + self._delay_ns, velocity))
 
     def moved_m(self, until_ns: int) -> Vector:
-        """Return how far it goes from the last time asked until now."""
+        """Return the distance since the last call."""
         travelled: Vector = (0.0, 0.0, 0.0)
         while self._coming and self._coming[0][0] <= until_ns:
             begin_ns, velocity = self._coming.popleft()
@@ -123,8 +123,8 @@ class DelayedVelocity:
 
 
 RATE_HZ = 250.0
-RESTING_PERIOD_S = 0.05  # a finger at rest is still reported, but costs next to nothing
-STEEPEST = 1.0  # slope that the arm's own force mode follows
+RESTING_PERIOD_S = 0.05  # a finger at rest is still reported, at little cost
+STEEPEST = 1.0  # slope that the force mode of the arm follows
 
 
 @dataclass(frozen=True)
@@ -145,8 +145,8 @@ class SimulatedArmParams(ForceLoopParams, CommandLimits):
     start_height_m: float = param(
         0.01, 'Height of the finger above the surface at the start.', unit='m', low=0.0, high=0.2
     )
-    command_timeout_s = 0.1  # that a command holds without a new one; afterwards the arm stands
-    finger_pipe: str = param('', "Named pipe on which the emulator is told where the finger is; '' tells nobody.")
+    command_timeout_s = 0.1  # that a command holds without a new one; afterwards the arm stops
+    finger_pipe: str = param('', "Named pipe for the finger position that the emulator reads; '' for none.")
 
 
 SEED = 1  # of the noise: equal runs are equal
@@ -164,7 +164,7 @@ class SimulatedArm(Arm):
     clock
         CLOCK_MONOTONIC in ns.
     own_thread
-        Move by itself at 250 Hz once connected. If False, whoever owns the arm calls `step`.
+        Move in a thread at 250 Hz once connected. If False, the owner of the arm calls `step`.
     shape
         Of the surface under the finger.
     """
@@ -190,7 +190,7 @@ class SimulatedArm(Arm):
         self._fault = ''
         self._push_n = 0.0
         self._true_n = 0.0
-        self._stuck_n: float | None = None  # what a frozen force sensor shows
+        self._stuck_n: float | None = None  # reading of a frozen force sensor
         self._drift_n = self._drift_n_s = 0.0
         self._noise_n = 0.0 if params.force_mode else params.force_noise_n
         self._rng = np.random.default_rng(SEED)
@@ -205,7 +205,7 @@ class SimulatedArm(Arm):
         self._delayed = DelayedVelocity(params.loop_delay_s, clock())
 
     def connect(self) -> None:
-        """Start to move in time; clears what was injected."""
+        """Start the thread; clear injected faults."""
         self.close()
         self._frozen, self._fault, self._push_n = False, '', 0.0
         self._jammed = False
@@ -247,28 +247,28 @@ class SimulatedArm(Arm):
             self._wake.set()
 
     def stop(self) -> None:
-        """Stand still."""
+        """Stop."""
         self._last_command = (STANDSTILL, self._clock())
 
     def doubt(self) -> str:
-        """Return in a sentence that the force comes too late to press by it, '' if not."""
+        """Return in a sentence that the force is too late for force control, '' if not."""
         return self._velocity.doubt() if self._velocity else ''
 
     def freeze(self) -> None:
-        """Behave like a controller that hangs: the state grows old, commands do nothing, until connected again."""
+        """Behave like a controller that hangs: an old state, no effect of commands, until connected again."""
         self._frozen = True
 
     def jam(self) -> None:
-        """Behave like an arm whose finger something holds along the surface, until connected again."""
+        """Behave like an arm whose finger is blocked along the surface, until connected again."""
         self._jammed = True
 
     def fail(self, reason: str) -> None:
-        """Behave like an arm in a protective stop: stand still and report the reason, until connected again."""
+        """Behave like an arm in a protective stop: stop and report the reason, until connected again."""
         self._fault = reason
         self._state = replace(self._state, velocity=(0.0, 0.0, 0.0), fault=reason)
 
     def push(self, force_n: float) -> None:
-        """Add a force as if somebody pushed the finger, until connected again."""
+        """Add an external force on the finger, until connected again."""
         self._push_n = force_n
 
     def freeze_force(self) -> None:
@@ -276,16 +276,16 @@ class SimulatedArm(Arm):
         self._stuck_n = self._state.force_n
 
     def drift_force(self, rate_n_s: float) -> None:
-        """Let the measured force depart from the true one at a constant rate, N/s, until connected again."""
+        """Let the measured force drift at a constant rate, N/s, until connected again."""
         self._drift_n_s = rate_n_s
 
     @property
     def true_force_n(self) -> float:
-        """How hard the finger really presses, whatever the force sensor shows."""
+        """True force of the finger, independent of the force sensor."""
         return self._true_n
 
     def displace(self, distance_m: Vector) -> None:
-        """Move as if somebody shoved the finger."""
+        """Displace the finger, as by an external push."""
         x, y, z = (at + step_m for at, step_m in zip(self._state.position, distance_m, strict=True))
         self._state = replace(self._state, position=(x, y, z))
 
@@ -296,7 +296,7 @@ class SimulatedArm(Arm):
         now_ns = self._clock()
         command, given_ns = self._last_command if not self._fault else (STANDSTILL, now_ns)
         left_s = self._params.command_timeout_s + (given_ns - now_ns) * 1e-9
-        # After it slept it cannot know for how long the newest command was meant: at most so long as one holds.
+        # After a pause the newest command holds at most for the usual time.
         moving_s = min(max(0.0, dt_s + min(0.0, left_s)), self._params.command_timeout_s)
         moved = self._delayed.moved_m(now_ns) if self._velocity else self._moved_m(command, moving_s)
         moved = (0.0, 0.0, moved[2]) if self._jammed else moved
@@ -327,7 +327,7 @@ class SimulatedArm(Arm):
         return self._last_command[0] == STANDSTILL
 
     def _measured_n(self, dt_s: float) -> float:
-        """Return what the force sensor shows of the true force."""
+        """Return the reading of the force sensor for the true force."""
         if self._stuck_n is not None:
             return self._stuck_n
         self._drift_n += self._drift_n_s * dt_s
@@ -342,7 +342,7 @@ class SimulatedArm(Arm):
         """Return the change of height in one step, m.
 
         Admittance control, vz = a·(F − F_wanted), solved exactly over the step: with F = k·depth the force error
-        decays as exp(−a·k·t), which no step size makes unstable. In contact the finger follows the surface beside.
+        decays as exp(−a·k·t), which no step size makes unstable. In contact the finger also follows the surface.
         """
         if command.force_n is None:
             return command.normal_m_s * dt_s

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What ROS controllers tell of an arm: its parameters, poses and forces, and the state of the finger from them."""
+"""State of the finger from the poses and forces of ROS controllers, and the parameters of such an arm."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from texture_exploration.guards import WITHOUT_GAPS
 from texture_exploration.safety import MOST_FORCE_N, MOST_M, CommandLimits
 
 # --------------------
-# What can be chosen about an arm that is driven by ROS controllers.
+# Parameters of an arm that is driven by ROS controllers.
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams, Co
         '', "Frame in which velocities are commanded, the base frame or that of the fingertip; '' is the base."
     )
     controller_manager: str = param(
-        '', "Controller manager that switches controllers when the arm is connected and let go; '' switches nothing."
+        '', "Controller manager that switches controllers when the arm is connected and released; '' switches nothing."
     )
     activate_controllers: str = param(
         'twist_controller', 'Controllers, separated by spaces, that are active only while the arm is connected.'
@@ -70,7 +70,7 @@ class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams, Co
     )
     loop_delay_s: float = param(
         0.02,
-        'Largest delay from a measured force to the motion that answers it; a longer one is measured as the '
+        'Largest delay from a measured force to the motion that responds to it; a longer one is measured as the '
         'finger comes down. Larger values lower the gain.',
         unit='s',
         low=0.0,
@@ -81,12 +81,12 @@ class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams, Co
     )
     accept_no_timeout: bool = param(
         False,
-        'Accepts a controller that holds the last velocity for ever: then nothing stops the arm when this machine or '
+        'Accepts a controller that keeps executing the last velocity: then nothing stops the arm when this machine or '
         'its network fails, but the limits of the robot.',
     )
     accept_shared_group: bool = param(
         False,
-        'Accepts such a controller also where the guard has no control group of its own, as in a container: what kills '
+        'Accepts such a controller also where the guard has no separate control group, as in a container: what kills '
         'the whole group leaves the arm moving.',
     )
     deadman_s: float = param(
@@ -99,7 +99,7 @@ class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams, Co
         False, 'Inverts the measured force, for a sensor that reports what the tool does to its surroundings.'
     )
     force_is_quantised: bool = param(
-        False, 'Lets a measured force repeat itself, as of a sensor that rounds, without being taken for frozen.'
+        False, 'Lets a measured force repeat itself, as of a sensor that rounds, without counting as frozen.'
     )
     force_smoothing_s: float = param(
         0.0, 'Time constant of the low-pass filter of the force; it delays the loop.', unit='s', low=0.0, high=0.1
@@ -146,29 +146,29 @@ class ForceSample(NamedTuple):
 
 
 # --------------------
-# Whether the controllers of an arm still work: pose and force are fresh, somebody listens, the arm follows.
+# Whether the controllers of an arm still work: pose and force are fresh, commands have a subscriber, the arm follows.
 
 FOLLOW_M = 0.002  # commanded, over which the arm must have followed
 FOLLOW_NS = 300_000_000  # an arm with lag needs time to set off
 LONGEST_NS = 3_000_000_000  # what is slower than `FOLLOW_M` in this time is no motion: a force being held
-FOLLOWED_SHARE = 0.1  # a controller may limit speed and acceleration to its own
-STOOD_SHARE = 0.3  # an arm that went less in any direction stood still, and may be told to lift
+FOLLOWED_FRACTION = 0.1  # of the commanded distance; a controller may limit speed and acceleration
+REST_FRACTION = 0.3  # of the commanded distance; an arm that moved less is at rest and may be lifted
 
 
 class FollowWatch:
-    """Compare the way that was commanded with the way that the finger has gone.
+    """Compare the commanded distance with that of the finger.
 
     The comparison begins again when the commanded velocity turns back: a late arm still goes the old way for its lag,
     which is no sign of a lost controller.
     """
 
     def __init__(self) -> None:
-        self.stood = True
+        self.at_rest = True
         self._begin: tuple[int, Array] | None = None
         self._asked_m: Array = np.zeros(3)
 
     def restart(self) -> None:
-        """Begin again: nothing was commanded, or nobody looked."""
+        """Restart: nothing was commanded, or the arm was not observed."""
         self._begin = None
 
     def update(self, now_ns: int, position: Vector, velocity_m_s: Vector, held_s: float) -> str:
@@ -183,11 +183,11 @@ class FollowWatch:
             if now_ns - begin_ns > LONGEST_NS:
                 self.restart()
             return ''
-        self.stood = float(np.linalg.norm(place - start)) <= STOOD_SHARE * asked_m
+        self.at_rest = float(np.linalg.norm(place - start)) <= REST_FRACTION * asked_m
         gone_m = float((place - start) @ self._asked_m) / asked_m
         took_s = (now_ns - begin_ns) * 1e-9
         self.restart()
-        if gone_m >= FOLLOWED_SHARE * asked_m:
+        if gone_m >= FOLLOWED_FRACTION * asked_m:
             return ''
         return f'the arm went {1e3 * gone_m:.1f} mm of the {1e3 * asked_m:.1f} mm commanded in {took_s:.1f} s'
 
@@ -197,14 +197,14 @@ class FollowWatch:
 
 GRAVITY_M_S2 = 9.81
 VELOCITY_OVER_NS = 30_000_000
-STILL_M_S = 1e-4  # a slower finger is at rest: what remains is the noise of its place
+STILL_M_S = 1e-4  # a slower finger is at rest: below is the noise of its position
 AGREE_NS = 1_000_000_000  # clocks by which a sample is older than this, or comes from the future, do not agree
-SKEW_NS = 5_000_000  # by which a sample may come from the future without a word
+SKEW_NS = 5_000_000  # by which a sample may come from the future without a warning
 REST: Vector = (0.0, 0.0, 0.0)
 
 
 class ToolState:
-    """Turn what the controllers report into the state of an arm."""
+    """Convert the messages of the controllers to the state of an arm."""
 
     def __init__(self, params: RosControllersParams) -> None:
         self._params = params
@@ -235,9 +235,9 @@ class ToolState:
         norm = math.hypot(*sample.rotation)
         if sample.frame_id != base:
             self._refuse('pose', f"is given in the frame '{sample.frame_id}'; '{base}' is needed ('base_frame_id')")
-        elif not (math.hypot(*sample.position_m) <= MOST_M and abs(norm - 1.0) <= 0.1):  # so NaN is none either
+        elif not (math.hypot(*sample.position_m) <= MOST_M and abs(norm - 1.0) <= 0.1):  # so NaN is invalid
             numbers = f'{_shown(sample.position_m)} m, quaternion {_shown(sample.rotation)}'
-            self.garbled = f"a pose on '{self._topics['pose']}' is none: {numbers}; see what sends it"
+            self.garbled = f"a pose on '{self._topics['pose']}' is invalid: {numbers}; check its sender"
         elif self._is_new('pose', now_ns, sample):
             self.rotation = quaternion_matrix(sample.rotation)
             self._position = self._frame.place(sample.position_m)
@@ -245,15 +245,15 @@ class ToolState:
             self._update_velocity(sample.stamp_ns or now_ns)
 
     def take_force(self, now_ns: int, sample: ForceSample, *, moving: bool) -> None:
-        """Take a force that came at `now_ns`, after the pose of that time; `moving` if the arm is told to move."""
+        """Take a force that came at `now_ns`, after the pose of that time; `moving` if the arm is commanded to move."""
         params = self._params
         if sample.frame_id not in (params.base_frame_id, params.tool_frame_id):
             allowed = f"'{params.tool_frame_id}' or '{params.base_frame_id}'"
             self._refuse('force', f"is given in the frame '{sample.frame_id}'; {allowed} is needed ('tool_frame_id')")
             return
-        if not math.hypot(*sample.force_n) <= MOST_FORCE_N:  # so NaN is none either
+        if not math.hypot(*sample.force_n) <= MOST_FORCE_N:  # so NaN is invalid
             numbers = f'{_shown(sample.force_n)} N'
-            self.garbled = f"a force on '{self._topics['force']}' is none: {numbers}; see what sends it"
+            self.garbled = f"a force on '{self._topics['force']}' is invalid: {numbers}; check its sender"
             self.came_ns['force'] = now_ns  # the finger can be lifted without a force
             return
         before_ns = self._taken_ns['force']
@@ -299,7 +299,7 @@ class ToolState:
             if ahead_ns > SKEW_NS:
                 return (
                     f"the clock that stamps the {kind} on '{self._topics[kind]}' is {ahead_ns * 1e-6:.0f} ms ahead of "
-                    'the clock of this machine: a late sample is not seen; set both by each other (chrony)'
+                    'the clock of this machine: a late sample is not detected; synchronise the two clocks (chrony)'
                 )
         return ''
 
@@ -309,7 +309,7 @@ class ToolState:
             age_s = self.listening.silence_s(time_ns, now_ns)
             if age_s > self._params.deadman_s:
                 return (
-                    f"no {kind} has come on '{self._topics[kind]}' for {1e3 * age_s:.0f} ms, so zero velocity was "
+                    f"no {kind} has arrived on '{self._topics[kind]}' for {1e3 * age_s:.0f} ms, so zero velocity was "
                     'commanded; check that its broadcaster is active'
                 )
         return ''
@@ -318,7 +318,7 @@ class ToolState:
         self.misplaced = f"the {kind} on '{self._topics[kind]}' {why}"
 
     def _is_new(self, kind: str, now_ns: int, sample: PoseSample | ForceSample) -> bool:
-        """Take note of a sample's age; return whether it differs from the one before, as a broadcaster may repeat."""
+        """Note the age of a sample; return whether it differs from the one before, as a broadcaster may repeat."""
         if sample.stamp_ns and sample.stamp_ns == self._stamps_ns[kind]:
             return False
         age_ns, deadman_s = sample.age_ns, self._params.deadman_s
@@ -329,9 +329,9 @@ class ToolState:
         self._late[kind] = ''
         if self.listening.silence_s(now_ns - age_ns, now_ns) > deadman_s:
             self._late[kind] = (
-                f"the {kind} on '{self._topics[kind]}' comes {age_ns * 1e-6:.0f} ms after its stamp, and "
-                f"{1e3 * deadman_s:.0f} ms are allowed ('deadman_s'), so zero velocity was commanded; find what holds "
-                'it up, or set the clocks of both machines by each other (chrony)'
+                f"the {kind} on '{self._topics[kind]}' arrives {age_ns * 1e-6:.0f} ms after its stamp, and "
+                f"{1e3 * deadman_s:.0f} ms are allowed ('deadman_s'), so zero velocity was commanded; find the cause "
+                'of the delay, or synchronise the clocks of both machines (chrony)'
             )
         return True
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""An arm of Universal Robots, reached through ur-rtde in a process of its own."""
+"""An arm of Universal Robots, through ur-rtde in a separate process."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ from texture_exploration.safety import CommandLimits
 
 
 class TcpConnection:
-    """A TCP connection on which every wait ends in time, and every failure is a sentence."""
+    """A TCP connection with a time limit on every wait, and a message for every failure."""
 
     def __init__(self, ip: str, port: int, timeout_s: float) -> None:
         self._where = f'{ip}:{port}'
@@ -62,7 +62,7 @@ class TcpConnection:
             ) from error
 
     def close(self) -> None:
-        """End the conversation."""
+        """Close the connection."""
         self._socket.close()
 
     def send(self, data: bytes) -> None:
@@ -73,7 +73,7 @@ class TcpConnection:
             raise self._silent() from error
 
     def read(self, size: int) -> bytes:
-        """Return exactly so many bytes."""
+        """Return exactly `count` bytes."""
         data = b''
         while len(data) < size:
             try:
@@ -110,7 +110,7 @@ LARGEST = 4096
 class UrCommand(NamedTuple):
     """Command to the arm in the base frame: a velocity, (3,), and perhaps a force that presses on the surface.
 
-    `time_ns` is when it was commanded, of CLOCK_MONOTONIC: a wish that waited for the worker is old.
+    `time_ns` is when it was commanded, of CLOCK_MONOTONIC: a command that waited for the worker is old.
     """
 
     time_ns: int
@@ -119,14 +119,14 @@ class UrCommand(NamedTuple):
 
 
 class UrReport(NamedTuple):
-    """What the controller measured last, in the base frame, and how it is.
+    """Newest measurement of the controller, in the base frame, and its status.
 
     `time_ns` is when it arrived, of CLOCK_MONOTONIC. `force_n` is the force of the surroundings on the tool. `unsteady`
-    says that the force sensor could not be zeroed, because the force changed all the while the finger rose; `zeroed`,
+    says that the force sensor could not be zeroed, because the force changed while the finger rose; `zeroed`,
     that it was, since the arm was connected or recovered. `watchdog_s` is how long the controller's watchdog waits.
 
     `counts` are totals since the arm was connected. `late`: gaps of more than 20 ms in what the controller sends.
-    `refused`: commands that it did not take. `zeroed`: how often the force sensor was zeroed. `slow_acknowledgements`:
+    `refused`: commands that it did not accept. `zeroed`: zeroings of the force sensor. `slow_acknowledgements`:
     commands that took longer than the watchdog waits while the arm moves; `slowest_acknowledgement_ms`: the longest
     that any took.
     """
@@ -155,16 +155,16 @@ def command_of(data: bytes) -> UrCommand:
 
 
 # --------------------
-# What can be chosen about an arm of Universal Robots.
+# Parameters of an arm of Universal Robots.
 
 
 @dataclass(frozen=True)
 class UrArmParams(ZeroingParams, SurfacePoseParams, CommandLimits):
-    """Where the controller is, where the surface is, and how the arm is supervised."""
+    """Address of the controller, pose of the surface, and supervision of the arm."""
 
     ip: str = param('127.0.0.2', 'IP address of the controller; the default, and a path, are of the emulated one.')
     command_timeout_s: float = param(
-        0.2, 'How long a command holds without a new one; afterwards the arm stands.', unit='s', low=0.02, high=2.0
+        0.2, 'How long a command holds without a new one; afterwards the arm stops.', unit='s', low=0.02, high=2.0
     )
     watchdog_hz: float = param(
         10.0,
@@ -188,18 +188,18 @@ class UrArmParams(ZeroingParams, SurfacePoseParams, CommandLimits):
 
 
 RATE_HZ = 250.0  # of commands and states: half of that of an e-Series
-DELAY_S = 0.02  # from a force to the motion that answers it: walls were pressed with 26 to 40 N at 50 mm/s
+DELAY_S = 0.02  # from a force to the motion that responds to it: walls were pressed with 26 to 40 N at 50 mm/s
 ACCELERATION_M_S2 = 2.0  # towards a new velocity: 50 mm/s after 25 ms
 ACKNOWLEDGE_S = (
-    1.0  # so long a controller may take to stop, to end force control and to zero; its watchdog waits as long
+    1.0  # time that a controller may take to stop, to end force control and to zero; its watchdog waits as long
 )
-PROBE_S = 1.5  # so long it may take to answer the first requests
+PROBE_S = 1.5  # time that it may take to answer the first requests
 
 # --------------------
-# The worker process as its parent sees it: start it, exchange messages with it, end it.
+# The worker process, for its parent: start it, exchange messages with it, end it.
 
 MODULE = 'texture_exploration.arms.ur_worker'
-UR_LINK_STOPPING_S = 1.5  # time to brake, beside what the controller takes to acknowledge it
+UR_LINK_STOPPING_S = 1.5  # time to brake, in addition to the acknowledgement of the controller
 ACKNOWLEDGEMENTS = 2  # of a stop and of the end of force control
 FINAL_MESSAGE_S = 0.05
 
@@ -240,7 +240,7 @@ class WorkerLink:
         self.check()
 
     def check(self) -> None:
-        """Return if the worker is there."""
+        """Return if the worker is running."""
         if not self._reader.is_alive() or self.report is None:
             raise DeviceError(self._why_ended())
 
@@ -254,7 +254,7 @@ class WorkerLink:
             raise DeviceError(self._why_ended()) from error
 
     def end(self) -> None:
-        """Let the arm come to rest and the worker end; kill it if it does not: then the watchdog stops the arm."""
+        """Stop the arm and end the worker; kill it if it does not end: then the watchdog stops the arm."""
         self._channel.shutdown(socket.SHUT_RDWR)
         try:
             self._process.wait(self._stopping_s)
@@ -281,7 +281,7 @@ class WorkerLink:
             return b''
 
     def _why_ended(self) -> str:
-        self._reader.join(FINAL_MESSAGE_S)  # what the worker said before it ended may still be on its way
+        self._reader.join(FINAL_MESSAGE_S)  # the last message of the worker may still be on its way
         if self._failure:
             return self._failure
         if self._process.poll() == -signal.SIGALRM:
@@ -300,11 +300,11 @@ DASHBOARD_BANNER = 'Universal Robots Dashboard Server'
 FIRST_WITHOUT_DASHBOARD = 10  # PolyScope X
 FIRST_WITH_REMOTE_CONTROL = (5, 6)
 # Oldest software by series: the oldest CB3 that ur-rtde 1.6.5 is tested with (its README); an e-Series with remote
-# control; a PolyScope X that takes programs on the port where ur-rtde sends its own.
+# control; a PolyScope X that takes programs on the port that ur-rtde uses.
 OLDEST: Mapping[int, tuple[int, int]] = {3: (3, 12), 5: (5, 6), 10: (10, 10)}
 CB3 = 3  # the series without a force sensor in the flange
 CONTROL_SCRIPT = 'rtde_control'  # the program of ur-rtde
-# Which it obeys; one client only may write it. By whether the upper range is used (FLAG_UPPER_RANGE_REGISTERS).
+# Register of its commands, for one client only. By whether the upper range is used (FLAG_UPPER_RANGE_REGISTERS).
 COMMAND_REGISTERS: Mapping[bool, str] = {False: 'input_int_register_0', True: 'input_int_register_24'}
 
 REQUEST_VERSION = 86  # 'V', types of RTDE messages
@@ -329,7 +329,7 @@ SAFETY_FAULTS: Mapping[int, str] = {
     13: 'three-position enabling stop',
 }
 
-# Force control about a fixed frame; the other axes may leave their path by so much: 0.1 m and 20°, as PolyScope does.
+# Force control about a fixed frame; the other axes may deviate by 0.1 m and 20°, as in PolyScope.
 FORCE_FRAME_FIXED = 2
 FORCE_DEVIATION_M = 0.1
 FORCE_DEVIATION_RAD = 0.349
@@ -337,9 +337,9 @@ STOP_DECELERATION_M_S2 = 10.0  # the default of ur-rtde
 
 
 # --------------------
-# Find out in plain Python, within a fixed time, whether a UR controller is there and ready.
+# Check in plain Python, within a fixed time, whether a UR controller is present and ready.
 #
-# ur-rtde waits without a limit for a controller that does not answer; so it is only told to connect where one does.
+# ur-rtde waits without a limit for a controller that does not answer; so it only connects to one that does.
 
 HEADER = struct.Struct('>HB')
 STATE = struct.Struct('>BI')  # recipe, runtime state
@@ -355,7 +355,7 @@ def rtde_version(ip: str, timeout_s: float) -> tuple[int, int]:
         _ask(line, REQUEST_VERSION, struct.pack('>H', PROTOCOL_VERSION))
         answer = _ask(line, CONTROLLER_VERSION, b'')
     if len(answer) < 8:
-        raise DeviceError(f'{ip}:{RTDE_PORT} does not tell its version; is it a UR controller?')
+        raise DeviceError(f'{ip}:{RTDE_PORT} does not report its version; is it a UR controller?')
     major, minor = struct.unpack_from('>2I', answer)
     return major, minor
 
@@ -368,7 +368,7 @@ def runtime_state(ip: str, timeout_s: float) -> int:
         _ask(line, START, b'')
         data = _await(line, DATA)
     if len(data) != STATE.size:
-        raise DeviceError(f'{ip}:{RTDE_PORT} does not tell whether a program runs; is it a UR controller?')
+        raise DeviceError(f'{ip}:{RTDE_PORT} does not report whether a program runs; is it a UR controller?')
     state: int
     _, state = STATE.unpack(data)
     return state
@@ -388,7 +388,7 @@ def _ask(line: TcpConnection, kind: int, payload: bytes) -> bytes:
 
 
 def _await(line: TcpConnection, kind: int) -> bytes:
-    """Return the payload of the next message of a type; others, such as texts, are passed over."""
+    """Return the payload of the next message of a type; others, such as texts, are skipped."""
     while True:
         size, answered = HEADER.unpack(line.read(HEADER.size))
         answer = line.read(max(0, size - HEADER.size))
@@ -397,7 +397,7 @@ def _await(line: TcpConnection, kind: int) -> bytes:
 
 
 class DashboardClient(TcpConnection):
-    """The dashboard server of a controller: a line is asked, a line is answered."""
+    """The dashboard server of a controller: one line per request, one line per answer."""
 
     def __init__(self, ip: str, timeout_s: float) -> None:
         super().__init__(ip, DASHBOARD_PORT, timeout_s)
@@ -431,8 +431,8 @@ def check_ready(ip: str, timeout_s: float) -> tuple[int, int]:
         safety = _safety(dashboard)
     if safety not in FREE_MODES:
         raise DeviceError(
-            f'the arm at {ip} is held by its safety system ({safety}); find out why, release it on the pendant, '
-            'and ask again'
+            f'the arm at {ip} is held by its safety system ({safety}); find the cause, release it on the '
+            'pendant, and repeat the request'
         )
     return version
 
@@ -465,19 +465,19 @@ def _safety(dashboard: DashboardClient) -> str:
 
 
 # --------------------
-# See to it that connecting stops nobody else's program on a UR controller: ur-rtde stops whatever runs there.
+# Make sure that connecting stops no program of another user on a UR controller: ur-rtde stops any program.
 
 SAMPLE_PERIOD_S = 0.05
 UR_PROGRAM_STOPPING_S = 2.0
-WATCHDOG_S = 0.5  # beside its period, until it has ended a program
+WATCHDOG_S = 0.5  # in addition to its period, until it has ended a program
 
 
 def check_program(params: UrArmParams, version: tuple[int, int], *, pause_is_ours: bool) -> None:
-    """Return if no program runs or pauses on the controller, or none that anybody needs.
+    """Return if no program runs or pauses on the controller, or only one that is not needed.
 
     A stop by the safety system may pause the program of the connection before: `pause_is_ours`. A control script of
-    ours whose process was killed is ended by its watchdog; one that has none yet is known by its name and by nobody
-    writing the register that it obeys.
+    ours whose process was killed is ended by its watchdog; one without a watchdog is known by its name and by no
+    client that writes its command register.
     """
     ip, timeout_s = params.ip, PROBE_S
     end_s = time.monotonic() + max(ACKNOWLEDGE_S, 1.0 / params.watchdog_hz) + WATCHDOG_S
@@ -499,7 +499,7 @@ def check_program(params: UrArmParams, version: tuple[int, int], *, pause_is_our
 
 
 def _program(ip: str, version: tuple[int, int], timeout_s: float) -> str:
-    """Return what runs or pauses, as the controller says it; '' if nothing does."""
+    """Return the program that runs or pauses, as the controller reports it; '' if there is none."""
     if version[0] >= FIRST_WITHOUT_DASHBOARD:
         runtime = runtime_state(ip, timeout_s)
         return '' if runtime == PROGRAM_STOPPED else f'runtime state {runtime}'
@@ -509,7 +509,7 @@ def _program(ip: str, version: tuple[int, int], timeout_s: float) -> str:
 
 
 def _stop(ip: str, version: tuple[int, int], timeout_s: float) -> None:
-    """Stop it by the dashboard; without one ur-rtde has to."""
+    """Stop it by the dashboard; without a dashboard ur-rtde stops it."""
     if version[0] >= FIRST_WITHOUT_DASHBOARD:
         return
     with closing(DashboardClient(ip, timeout_s)) as dashboard:
@@ -523,13 +523,13 @@ def _stop(ip: str, version: tuple[int, int], timeout_s: float) -> None:
         time.sleep(SAMPLE_PERIOD_S)
 
 
-BASE_FRAME_ID = 'base'  # as ur_robot_driver and UR's own description call it, without a prefix
+BASE_FRAME_ID = 'base'  # as in ur_robot_driver and the description of UR, without a prefix
 RECOVERY_S = 6.0
 POLL_S = 0.01
 
 
 class UrArm(SurfaceArm):
-    """A Universal Robots e-Series through ur-rtde. Nothing here waits for the controller longer than it says.
+    """A Universal Robots e-Series through ur-rtde. No method waits for the controller longer than declared.
 
     Parameters
     ----------
@@ -544,7 +544,7 @@ class UrArm(SurfaceArm):
     def __init__(self, params: UrArmParams = UrArmParams()) -> None:
         super().__init__(replace(params, ip=loopback_address(params.ip)))
         self._link: WorkerLink | None = None
-        self._lock = -1  # on the address; the worker, which brings the arm to rest, holds it, too
+        self._lock = -1  # on the address; also held by the worker, which stops the arm
         self._series = 0  # of the controller that was connected last
         self._paused = False  # a stop by the safety system may have left our program paused
 
@@ -564,7 +564,7 @@ class UrArm(SurfaceArm):
         Raises
         ------
         DeviceError
-            If it cannot be reached, its arm cannot move, or a program of somebody else is there; see `take_over`.
+            If it cannot be reached, its arm cannot move, or a program of another user is there; see `take_over`.
         """
         self.close()
         if importlib.util.find_spec('rtde_control') is None:
@@ -588,8 +588,8 @@ class UrArm(SurfaceArm):
         if self._series != CB3:
             return ''
         return (
-            f'the controller at {self._params.ip} is a CB3, which estimates forces within about 10 N: what is pressed '
-            'may be far from what is asked; use an e-Series, or a force sensor in the flange'
+            f'the controller at {self._params.ip} is a CB3, which estimates forces within about 10 N: the actual force '
+            'may be far from the requested one; use an e-Series, or a force sensor in the flange'
         )
 
     def close(self) -> None:
@@ -620,7 +620,7 @@ class UrArm(SurfaceArm):
         )
 
     def command(self, command: ArmCommand) -> None:
-        """Hand a command to the worker.
+        """Send a command to the worker.
 
         The force sensor is zeroed in free air only, which a rise of 3 mm without a change of the force proves.
         As long as it has not been zeroed since the arm was connected or recovered, a command with a force lifts first.
@@ -647,7 +647,7 @@ class UrArm(SurfaceArm):
     def recover(self) -> None:
         """Release a protective stop and start the control program again, without connecting again.
 
-        Whoever calls this has made sure that the arm may move.
+        The caller makes sure that the arm may move.
 
         Raises
         ------

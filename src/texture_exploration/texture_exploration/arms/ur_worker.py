@@ -45,7 +45,7 @@ from texture_exploration.arms.ur import (
 from texture_exploration.force_control import FORCE_SPEED_M_S
 
 # --------------------
-# The watchdog of the controller: it stops the arm when it hears nothing, and it waits while a command is carried out.
+# The watchdog of the controller: it stops the arm without messages, and it waits while a command is executed.
 #
 # While ur-rtde waits until a command is acknowledged it sends nothing, so that the watchdog would stop the arm in the
 # middle of a stop. Nor may anything else be sent then: it would overwrite the command.
@@ -88,7 +88,7 @@ class Watchdog:
 
     @contextmanager
     def patient(self) -> Iterator[None]:
-        """Let the watchdog wait for what is called within, and guard a moving arm again afterwards."""
+        """Let the watchdog wait during the block, and guard a moving arm again afterwards."""
         took_s = self._set(self._patient_s)
         self.armed = False
         try:
@@ -98,7 +98,7 @@ class Watchdog:
             self._set(self.moving_s)
 
     def call(self, command: Callable[..., Any], *arguments: Any) -> bool:
-        """Send a command that is acknowledged; return whether the controller took it."""
+        """Send a command that is acknowledged; return whether the controller accepted it."""
         self._guard(self._patient_s)
         begin_s = self._clock()
         taken = bool(command(*arguments))
@@ -108,7 +108,7 @@ class Watchdog:
         return taken
 
     def _set(self, period_s: float) -> float:
-        """Return how long it took."""
+        """Return the duration."""
         begin_s = self._clock()
         self.armed = self.call(self._control.setWatchdog, 1.0 / period_s)
         return self._clock() - begin_s
@@ -119,13 +119,13 @@ class Watchdog:
 #
 # All commands pass through the same registers of the controller, which its script reads every 2 ms. Commands that
 # stream are not acknowledged: a second one would overwrite the first before it is read. So each cycle sends one of
-# them, and what must hold is said again and again.
+# them, and commands that must hold are repeated.
 
 TURN_NS = 100_000_000  # in which an arm has turned back
 
 
 class Mode(enum.Enum):
-    """What the arm is doing."""
+    """Mode of the arm."""
 
     STANDSTILL = enum.auto()
     SPEED = enum.auto()
@@ -154,7 +154,7 @@ class UrCommandStream:
         self._turned_ns = -TURN_NS
 
     def observe(self, time_ns: int, position_m: Vector, force_n: Vector) -> None:
-        """Take over what the controller measured last, in the base frame."""
+        """Take the newest measurement of the controller, in the base frame."""
         place = self._frame.place(position_m)
         self._height_m, self._measured_ns = place[2], time_ns
         self._air.update(time_ns, place, self._frame.direction(force_n)[2])
@@ -171,7 +171,7 @@ class UrCommandStream:
         self._count(STREAM[mode](self, ur_command))
 
     def stand_still(self) -> None:
-        """Stop at once, and return when the arm stands still."""
+        """Stop at once, and return when the arm is at rest."""
         with self._watchdog.patient():
             self._stop()
 
@@ -184,7 +184,7 @@ class UrCommandStream:
         self._air.presume_contact()
 
     def _lifted_first(self, ur_command: UrCommand | None) -> UrCommand | None:
-        """Return the wish, or to rise and to stand still before it if it needs a force sensor that is not zeroed."""
+        """Return the command, or first a rise and a rest if it needs a force sensor that is not zeroed."""
         if ur_command is None or ur_command.force_n is None or self.trusted:
             self._air.seek(None)
             return ur_command
@@ -251,7 +251,7 @@ class UrCommandStream:
             return False
         self.trusted = True
         self.zeroings += 1
-        self._air.presume_contact()  # the force is another one now; the next zeroing needs a proof of its own
+        self._air.presume_contact()  # the force is another one now; the next zeroing needs a new proof
         return True
 
     def _hold_still(self, _ur_command: UrCommand | None) -> bool:
@@ -266,7 +266,7 @@ class UrCommandStream:
         if self._turns_back(ur_command.velocity_m_s):
             self._turned_ns = self._measured_ns
         self._led_m_s = ur_command.velocity_m_s
-        # Whoever turns back has met something: as hard as a stop.
+        # A finger that turns back has met something: as hard as a stop.
         turns = self._measured_ns - self._turned_ns < TURN_NS
         acceleration = max(STOP_DECELERATION_M_S2 if turns else 0.0, ACCELERATION_M_S2)
         return bool(self._control.speedL(velocity, acceleration, 1.0 / RATE_HZ))
@@ -280,7 +280,7 @@ class UrCommandStream:
         return self._frame.to_base((x, y, 0.0))
 
     def _force(self, ur_command: UrCommand) -> bool:
-        """Say by turns how to press and how to slide."""
+        """Command force and sliding alternately."""
         self._next_is_speed = not self._next_is_speed
         if not self._next_is_speed:
             return self._speed(ur_command)
@@ -312,25 +312,25 @@ def _mode(ur_command: UrCommand | None) -> Mode:
 #
 # The constructors of ur-rtde hold Python's global lock and wait without a limit, and a command may wait for minutes.
 # Here an alarm of the kernel ends the process when it hangs; the watchdog of the controller then stops the arm. The
-# process ends by itself, with the arm at rest, when its parent is gone.
+# process ends, with the arm at rest, when its parent is gone.
 
 VARIABLES = ['timestamp', 'actual_TCP_pose', 'actual_TCP_speed', 'actual_TCP_force', 'safety_mode', 'runtime_state']
-HANGING_S = 2.0  # no command takes so long
+HANGING_S = 2.0  # no command takes longer
 RESTART_S = 5.0  # of the program on the controller
 LATE_S = 0.02
 OTHER_PROGRAM = (
-    'the program on the controller was stopped, and somebody else started one; see who uses the arm, and connect again'
+    'the program on the controller was stopped, and another user started one; check who uses the arm, and connect again'
 )
 LOST = 'the connection to the controller was lost; is it still on, and the cable in place?'
 
 
 class Observer:
-    """Reports what the controller measures, in a thread of its own: commands may take a while.
+    """Reports the measurements of the controller, in a separate thread: commands may take a while.
 
     `newest` is the last report, None before the first; `unsteady`, `zeroed`, `watchdog_s` and `counts` come from the
     other thread.
 
-    Silence counts only while this thread is awake, so that a machine that stalls is not taken for a dead controller.
+    Silence counts only while this thread is awake, so that a stalled machine is not reported as a dead controller.
     """
 
     def __init__(self, receive: Any, channel: socket.socket, params: UrArmParams) -> None:
@@ -349,7 +349,7 @@ class Observer:
         self._late = 0
 
     def run(self) -> None:
-        """Look in every cycle whether there is news."""
+        """Check in every cycle for a new state."""
         last_s = time.monotonic()
         try:
             while self.connected and self._receive.isConnected():
@@ -406,7 +406,7 @@ class Worker:
         self._frame = SurfaceFrame(params.surface_pose)
         receive_class = importlib.import_module('rtde_receive').RTDEReceiveInterface
         control_class = importlib.import_module('rtde_control').RTDEControlInterface
-        # Whether the arm is under remote control has been asked already.
+        # Remote control has been checked already.
         flags = control_class.FLAG_UPLOAD_SCRIPT | control_class.FLAG_DISABLE_REMOTE_CONTROL_CHECK
         if params.upper_range_registers:
             flags |= control_class.FLAG_UPPER_RANGE_REGISTERS
@@ -443,7 +443,7 @@ class Worker:
         begin = self._control.initPeriod()
         set_alarm(HANGING_S)
         self._take_measurement()
-        # What is sent to a controller that does not answer would be obeyed late, when nobody means it any more.
+        # A controller that does not answer would execute a command late, when it is outdated.
         if self._stopped:
             self._clear()
         elif not self._observer.silent:
@@ -452,16 +452,16 @@ class Worker:
         self._control.waitPeriod(begin)
 
     def _take_measurement(self) -> None:
-        """Pass on what was measured last."""
+        """Pass on the newest measurement."""
         newest = self._observer.newest
         if newest is not None and newest.time_ns != self._measured_ns:
             self._measured_ns = newest.time_ns
             self._commands.observe(newest.time_ns, newest.position_m, newest.force_n)
 
     def _update_observer(self) -> None:
-        """Pass on to the observer what it reports beside the measurements."""
+        """Pass on to the observer what it reports in addition to the measurements."""
         commands, watchdog = self._commands, self._watchdog
-        # After the cycle and not at once: a force that is told as zeroed is one of after the zeroing.
+        # After the cycle and not at once: a force that is reported as zeroed is from after the zeroing.
         self._observer.unsteady, self._observer.zeroed = commands.unsteady, commands.trusted
         self._observer.watchdog_s = watchdog.moving_s
         self._observer.counts = {
@@ -472,7 +472,7 @@ class Worker:
         }
 
     def _watch_program(self) -> None:
-        """Notice whether another program runs than ours: one that plays again after a stop was started by others.
+        """Detect another program: one that plays again after a stop was started by others.
 
         It may be one of theirs that reads the same registers, or ours that ur-rtde started, without its watchdog.
         """
@@ -482,8 +482,8 @@ class Worker:
         self._stopped = self._was_playing and not playing
 
     def _let_go(self) -> None:
-        """Bring the arm to rest and end its program, whatever ends this process."""
-        # Commands to a program that is not ours, or on a lost connection, would make ur-rtde start its own again.
+        """Stop the arm and end its program, at any end of this process."""
+        # Commands to a program that is not ours, or on a lost connection, would make ur-rtde start its program again.
         ours = not self._stopped and not self._other_program
         if ours and self._observer.connected and not self._observer.silent and self._control.isConnected():
             with contextlib.suppress(RuntimeError):
@@ -492,7 +492,7 @@ class Worker:
                 self._control.stopScript()
 
     def _receive_commands(self) -> bool:
-        """Take over what the parent said last; return whether it is still there."""
+        """Take the newest command of the parent; return whether the parent is still there."""
         try:
             while data := self._channel.recv(LARGEST, socket.MSG_DONTWAIT):
                 self._handle(data)
@@ -546,7 +546,7 @@ class Worker:
 
     def _set_watchdog(self) -> None:
         if not self._watchdog.arm():
-            raise RuntimeError('the controller did not take the watchdog, without which the arm does not move')
+            raise RuntimeError('the controller did not accept the watchdog, without which the arm does not move')
 
 
 def _vector(values: Sequence[float]) -> Vector:
@@ -555,7 +555,7 @@ def _vector(values: Sequence[float]) -> Vector:
 
 
 def set_alarm(seconds: float) -> None:
-    """Let the kernel end this process unless it sets the alarm again in time; no lock of Python can stop it."""
+    """Let the kernel end this process unless it sets the alarm again in time, independent of Python's lock."""
     signal.setitimer(signal.ITIMER_REAL, seconds)
 
 
@@ -571,14 +571,14 @@ def main() -> None:
     try:
         worker = Worker(params, channel)
         reason = worker.run()
-    except RuntimeError as error:  # so ur-rtde tells what it met
+    except RuntimeError as error:  # the way in which ur-rtde reports a fault
         reason = str(error)
-    except Exception as error:  # an error of ours: the arm was stopped on the way out, and the parent is told
+    except Exception as error:  # an error of ours: the arm was stopped, and the error is reported to the parent
         traceback.print_exc()
         reason = f'the process that talks to the controller failed ({error!r}) and stopped the arm; connect again'
     if reason:
         channel.send(FAILURE + reason.encode()[: LARGEST - 1])
-    # To end the interfaces of ur-rtde takes seconds of sleep; the end of the process closes their connections too.
+    # Closing the interfaces of ur-rtde takes seconds; the end of the process also closes their connections.
     os._exit(0)
 
 

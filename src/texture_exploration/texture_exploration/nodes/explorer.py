@@ -126,7 +126,7 @@ class FrameBroadcaster:
         self._static.publish(self._kind(transforms=[transform]))
 
     def fingertip(self, state: ExplorationState) -> None:
-        """Broadcast where the finger is, with the axes of the surface; a state without a place is passed over."""
+        """Broadcast the position of the finger, with the axes of the surface; a state without one is skipped."""
         if self._moving is None or state.x_m != state.x_m:
             return
         place = (state.x_m, state.y_m, state.z_m)
@@ -145,7 +145,7 @@ class FrameBroadcaster:
 
 FEEDBACK_PERIOD_S = 0.05
 IDLE_PERIOD_S = 1.0
-# rclpy raises an error if one line of code logs at several levels, so each level has a line of its own.
+# rclpy raises an error if one line of code logs at several levels, so each level has a separate line.
 LOGGED: dict[str, Callable[[Any, str], Any]] = {
     'info': lambda logger, text: logger.info(text),
     'warning': lambda logger, text: logger.warning(text),
@@ -155,16 +155,14 @@ PRESSED = (
     'the force sensor shows {:.1f} N, so the finger may press, as after an explorer that was killed: `texture lift` '
     "lifts it now, and the first exploration does so; 'lift_at_start: true' does so at every start"
 )
-RESULT_KEPT_S = 60  # for a client that asks late; rclpy's 15 min are hundreds of results
+RESULT_KEPT_S = 60  # for a late client; rclpy's 15 min are hundreds of results
 
 
 @dataclass(frozen=True)
 class ExplorerParams:
-    """Which arm it is, and who takes control of it."""
+    """The arm, and when control of it is taken."""
 
-    arm: str = param(
-        'simulated', "Arm that carries the finger: a name of the catalogue, or 'module:Class' of your own."
-    )
+    arm: str = param('simulated', "Arm that carries the finger: a name of the catalogue, or a user's 'module:Class'.")
     autostart: bool = param(
         True,
         'Configures and activates the node at start-up, which takes control of the arm; false leaves that to a '
@@ -181,9 +179,9 @@ class ExplorerParams:
 
 
 class ExplorerNode(PatientLifecycleNode):
-    """Explore on request, as a service or as an action; publish what the finger is doing.
+    """Explore on request, as a service or as an action; publish the state of the finger.
 
-    Configuring checks that the arm answers, activating takes control of it, deactivating lifts the finger and lets go.
+    Configuring checks that the arm answers, activating takes control, deactivating lifts the finger and releases it.
     """
 
     def __init__(self, **kwargs: Any) -> None:
@@ -208,7 +206,7 @@ class ExplorerNode(PatientLifecycleNode):
             msg.ModelInfo, 'model_info', partial(setattr, self, '_model'), quality_of_service('model_info')
         )
         self.create_subscription(msg.RoughnessEstimate, 'roughness', self._on_estimate, ESTIMATE_QOS)
-        group = ReentrantCallbackGroup()  # what waits for an exploration must not keep `stop` waiting
+        group = ReentrantCallbackGroup()  # a call that waits for an exploration must not block `stop`
         self.create_service(srv.Explore, 'explore', self._on_service, callback_group=group)
         self._offer('~/stop', self._stop, group)
         self._offer('~/recover', self._recover, group)
@@ -234,13 +232,13 @@ class ExplorerNode(PatientLifecycleNode):
         if self._autostart:
             self.trigger_configure()
             self.trigger_activate()
-            self._autostart = False  # what follows was asked for by somebody
+            self._autostart = False  # later transitions are requested
         else:
             self._explorer.release()
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """See whether the arm answers, without control of it."""
-        # The activation, which follows at once, sees that too.
+        """Check whether the arm answers, without taking control."""
+        # The activation, which follows at once, also checks it.
         if not self._autostart and not self._tried(self._explorer.arm.check):
             return TransitionCallbackReturn.FAILURE
         return super().on_configure(state)
@@ -265,23 +263,23 @@ class ExplorerNode(PatientLifecycleNode):
             self.get_logger().warning(PRESSED.format(force_n))
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Lift the finger and let go of the arm."""
+        """Lift the finger and release the arm."""
         self._let_go()
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Hold nothing, as already since the deactivation."""
+        """Do nothing: the arm was released by the deactivation."""
         self._let_go()
         return super().on_cleanup(state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Lift the finger and let go of the arm, from whatever state."""
+        """Lift the finger and release the arm, from any state."""
         self._let_go()
         return super().on_shutdown(state)
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Let go of the arm after an internal error in a transition."""
-        self.get_logger().error('a transition broke off through an internal error; the arm is let go')
+        """Release the arm after an internal error in a transition."""
+        self.get_logger().error('a transition was aborted by an internal error; the arm is released')
         self._let_go()
         return super().on_error(state)
 
@@ -300,12 +298,12 @@ class ExplorerNode(PatientLifecycleNode):
         return True
 
     def shutdown(self) -> None:
-        """Lift the finger, let the arm go, leave nobody waiting."""
+        """Lift the finger, release the arm, end all waits of clients."""
         self._closing, current = True, self._explorer.current
         for estimates in list(self._open.values()):
             estimates.cancel()
         self._explorer.close()
-        if current is not None:  # said here, while this node can still log
+        if current is not None:  # logged here, while this node still can
             outcome = current.outcome if current.ended.is_set() else STILL_MOVING
             self._log_end(current.exploration_id, outcome)
 
@@ -327,7 +325,7 @@ class ExplorerNode(PatientLifecycleNode):
         params = declare(self, SignalWatchParams)
         if not params.watch_signal:
             return no_signal_watch
-        # The full name tells which finger of which arm; at the root 'signal' is what everybody calls it.
+        # The full name identifies finger and arm; at the root the usual name is 'signal'.
         try:
             names = {topic: self.resolve_topic_name(topic).removeprefix('/') for topic in params.topics}
         except RCLError as error:
@@ -337,7 +335,7 @@ class ExplorerNode(PatientLifecycleNode):
             ) from error
         watch = SignalWatch(params.signal_timeout_s, time.monotonic_ns, tuple(names.values()))
         for topic, name in names.items():
-            # The bytes as they come: what they say is the business of others.
+            # Raw bytes: only their arrival counts.
             self.create_subscription(
                 msg.TactileSignal, topic, lambda _data, name=name: watch.on_samples(name), SENSOR_QOS, raw=True
             )
@@ -364,7 +362,7 @@ class ExplorerNode(PatientLifecycleNode):
         return action.Explore.Result(result=result)
 
     def _explore(self, request: msg.ExplorationRequest, wait: Callable[[Exploration], None]) -> msg.ExplorationResult:
-        """Begin, attend to it until the finger is lifted, and return the result for the service or the action."""
+        """Begin, wait until the finger is lifted, and return the result for the service or the action."""
         result = msg.ExplorationResult()
         try:
             exploration_id = new_id(self.get_clock().now().nanoseconds, next(self._numbers), self._rng)
@@ -398,10 +396,10 @@ class ExplorerNode(PatientLifecycleNode):
         return result
 
     def _check_clock(self) -> None:
-        """Refuse to move while the time of ROS stands still: nothing could be stamped."""
+        """Refuse to move while the time of ROS does not advance: states would have no valid stamps."""
         if not self.get_clock().now().nanoseconds:
             raise MotionRefused(
-                "'use_sim_time' is true, and no time has come on '/clock'; start what publishes it, or set it to false",
+                "'use_sim_time' is true, and no time has arrived on '/clock'; start its publisher, or set it to false",
                 ExplorationError.NOT_ACTIVE,
             )
 
@@ -423,7 +421,7 @@ class ExplorerNode(PatientLifecycleNode):
             estimates.wait_until_final(kinds, self._estimate_timeout_s)
 
     def _offer(self, name: str, work: Callable[[], str], group: ReentrantCallbackGroup) -> None:
-        """Offer a service without numbers; `work` returns what was done, or raises why not."""
+        """Offer a service without arguments; `work` returns a message, or raises an error."""
 
         def answer(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             try:
@@ -447,15 +445,15 @@ class ExplorerNode(PatientLifecycleNode):
         return f'the finger rose by {1e3 * self._explorer.lift():.1f} mm, and nothing touches it'
 
     def _touch_surface(self) -> str:
-        told = self._explorer.touch_surface()
+        message = self._explorer.touch_surface()
         self._broadcast_surface()
         self.set_parameters([Parameter(name, value=value) for name, value in asdict(self._explorer.patch).items()])
-        return told
+        return message
 
     def _forget_touches(self) -> str:
         count = self._explorer.forget_touches()
         touches = 'the touch is' if count == 1 else f'{count} touches are'
-        forgotten = f'{touches} forgotten' if count else 'no touch was taken, so none is forgotten'
+        forgotten = f'{touches} forgotten' if count else 'no touch was recorded, so none is removed'
         return f'{forgotten}; the surface stays as it is'
 
     def _on_estimate(self, message: msg.TextureEstimate | msg.RoughnessEstimate) -> None:
@@ -498,7 +496,7 @@ class ExplorerNode(PatientLifecycleNode):
             self._info = info
             published = copy.copy(info)
             published.header = Header(stamp=self.get_clock().now().to_msg())
-            with contextlib.suppress(RCLError):  # after a shutdown of ROS nobody listens any more
+            with contextlib.suppress(RCLError):  # after a shutdown of ROS there is no subscriber
                 self._infos.publish(published)
 
     def _why_not_ready(self) -> str:
@@ -516,7 +514,7 @@ class ExplorerNode(PatientLifecycleNode):
             self._states.publish(to_msg(state))
             self._frames.fingertip(state)
         except RCLError:
-            # After a shutdown of ROS nobody listens any more, but the finger still has to be lifted.
+            # After a shutdown of ROS there is no subscriber, but the finger still has to be lifted.
             if self.context.ok():
                 raise
 

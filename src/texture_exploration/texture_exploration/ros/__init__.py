@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The only part of texture_exploration beside its nodes that imports ROS."""
+"""The only part of texture_exploration that imports ROS, in addition to its nodes."""

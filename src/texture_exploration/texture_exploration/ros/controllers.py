@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The topics of ROS controllers, taken by whoever polls them: no executor, no callbacks, one thread.
+"""The topics of ROS controllers, polled: no executor, no callbacks, one thread.
 
-A context of its own makes the arm independent of the node that owns it: zero velocity can still be sent when that node
+A separate context makes the arm independent of the node that owns it: zero velocity can still be sent when that node
 is shut down. Names follow the namespace and the remappings of the process.
 
-One commander an arm: on this machine a lock decides, which is taken before anything is published and which the guard
-holds, too. Beyond it the publishers of the topic do, by their ids; rclpy offers no exclusive ownership of a topic.
+One commander per arm: on this machine a lock decides, which is taken before anything is published and is also held
+by the guard. On other machines the ids of the publishers decide; rclpy has no exclusive ownership of topics.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ CONTROLLER_TOPICS_NODE = 'arm_topics'
 COMMAND_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)  # fits every subscriber
 ARRIVAL_S = 0.2
 LOOKING_S = 0.05
-ANNOUNCED_S = 3.0  # participants announce themselves so often (rmw_fastrtps)
-# So long after the controller was found, no other publisher may show, on this machine either: a new participant finds
+ANNOUNCED_S = 3.0  # period in which participants announce themselves (rmw_fastrtps)
+# For this time after the controller was found, no other publisher may appear, also on this machine: a participant finds
 # the publishers of another only when that one announces itself again, if the first messages between both were lost.
 ALONE_S = 2 * ANNOUNCED_S
 NO_TIMEOUT = (
-    "the controller on '{topic}' declares no timeout ('controller_timeout_s' is 0): it may hold the last velocity for "
-    "ever if this machine or its network fails. Set its timeout, or set 'accept_no_timeout: true' once the safety "
+    "the controller on '{topic}' declares no timeout ('controller_timeout_s' is 0): it may keep executing the last "
+    "velocity if this machine or its network fails. Set its timeout, or set 'accept_no_timeout: true' once the safety "
     'limits of the robot bound speed and force (docs/safety.md)'
 )
 NO_SCOPE = (
@@ -64,7 +64,7 @@ class RosTopics:
         self._node = node = Node(
             CONTROLLER_TOPICS_NODE,
             context=self._context,
-            cli_args=['--ros-args', '-r', f'__node:={CONTROLLER_TOPICS_NODE}'],  # the process may rename its own node
+            cli_args=['--ros-args', '-r', f'__node:={CONTROLLER_TOPICS_NODE}'],  # the process may rename its node
             enable_rosout=False,
             start_parameter_services=False,
         )
@@ -126,12 +126,12 @@ class RosTopics:
         return int(self._node.get_clock().now().nanoseconds) - stamp_ns if stamp_ns else 0
 
     def listeners(self) -> int:
-        """Return how many nodes listen to the commanded velocities, and can also be reached by the guard."""
+        """Return the number of subscribers to the commanded velocities that the guard also reaches."""
         assert self._guard is not None
         return min(self._twists.get_subscription_count(), self._guard.reached)
 
     def unsafe(self) -> str:
-        """Return why the arm must not go on although it obeys: another commands it, or no guard would stop it."""
+        """Return why a motion must end although the arm obeys: another commands it, or no guard would stop it."""
         assert self._guard is not None
         fault, now_s = self._guard.fault(), time.monotonic()
         if self._guard.participant and now_s - self._looked_s > LOOKING_S:
@@ -139,7 +139,7 @@ class RosTopics:
         return fault or self._other
 
     def beat(self, *, moving: bool) -> None:
-        """Tell the guard that the commanding process lives, and whether the arm may still move."""
+        """Send the guard a heartbeat and whether the arm may still move."""
         assert self._guard is not None
         self._guard.beat(moving=moving)
 
@@ -175,11 +175,11 @@ class RosTopics:
         if answer is None or not answer.ok:
             did = 'does not answer' if answer is None else f'refused: {getattr(answer, "message", "") or "see its log"}'
             raise DeviceError(
-                f"'{manager}' was asked to activate {' '.join(activate)} instead of {' '.join(deactivate)}, and {did}"
+                f"'{manager}' was to activate {' '.join(activate)} instead of {' '.join(deactivate)}, and {did}"
             )
 
     def _ask(self, kind: Any, name: str, request: Any) -> Any:
-        """Return the answer of a service, None if none comes in time; nobody spins this node meanwhile."""
+        """Return the answer of a service, None if none comes in time; the node is not spun meanwhile."""
         client = self._node.create_client(kind, name)
         executor = SingleThreadedExecutor(context=self._context)
         try:
@@ -193,7 +193,7 @@ class RosTopics:
             self._node.destroy_client(client)
 
     def _wait_until_alone(self) -> None:
-        """Return once the controller is there and nobody else commands it; who does must not be disturbed by a look."""
+        """Return once the controller is found and has no other commander, which this check must not disturb."""
         begin_s, alone_s = time.monotonic(), 0.0
         topic = self._commanded_topics[0]
         while True:
@@ -205,8 +205,8 @@ class RosTopics:
                     if other:
                         raise DeviceError(f'{other}; end it first. ROS forgets one that was killed after 20 s')
                     raise DeviceError(
-                        f"nobody listens on '{topic}'. Check that the controller is active, and that ROS_DOMAIN_ID and "
-                        'ROS_AUTOMATIC_DISCOVERY_RANGE are those of the robot'
+                        f"no node subscribes to '{topic}'. Check that the controller is active, and that ROS_DOMAIN_ID "
+                        'and ROS_AUTOMATIC_DISCOVERY_RANGE are those of the robot'
                     )
             else:
                 alone_s = alone_s or now_s
@@ -215,12 +215,12 @@ class RosTopics:
             time.sleep(LOOKING_S)
 
     def _other_commander(self, *ours: str) -> str:
-        """Return in a sentence who else commands, '' if nobody does; `ours` are the participants of this explorer."""
+        """Return in a sentence another commander, '' if there is none; `ours` are the participants of this explorer."""
         for topic in self._commanded_topics:
             for info in self._node.get_publishers_info_by_topic(topic):
                 if sender(info) not in ours:
                     name = f'{info.node_namespace.rstrip("/")}/{info.node_name}'
-                    return f"'{name}' commands the arm, too: it publishes on '{topic}'"
+                    return f"'{name}' also commands the arm: it publishes on '{topic}'"
         return ''
 
     def close(self) -> None:
@@ -238,7 +238,7 @@ class RosTopics:
 
 
 def _refuse_unguarded(params: RosControllersParams) -> None:
-    """Refuse a controller that would go on for ever, as long as the parameters do not accept that."""
+    """Refuse a controller that may keep moving without limit, unless the parameters accept it."""
     if params.controller_timeout_s:
         return
     for missing, accepted in (

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The process that brings an arm to rest when the process that commanded it is silent or gone.
+"""The process that stops an arm when the commanding process is silent or gone.
 
-A controller may hold the last velocity for ever: the twist controller of `ur_robot_driver` has no timeout. The guard
-hears a heartbeat on a socket whose other end only the commanding process holds. When an arm that may still move is no
-longer spoken for, as when that process hangs, is stopped (SIGSTOP) or frozen, it commands zero velocity, and zero force
-to a compliance controller; the kernel closes the socket however the process ends, also by SIGKILL. It goes on until
+A controller may keep executing the last velocity: the twist controller of `ur_robot_driver` has no timeout. The guard
+receives a heartbeat on a socket whose other end only the commanding process holds. If an arm that may still move is no
+longer commanded, as when that process hangs, is stopped (SIGSTOP) or frozen, it commands zero velocity, and zero force
+to a compliance controller; the kernel closes the socket at any end of the process, also by SIGKILL. It continues until
 the pose shows rest, and holds the lock of the arm until then.
 """
 
@@ -46,7 +46,7 @@ def stamped(kind: Any, node: Node, frame_id: str) -> Any:
 
 
 def newest(subscription: Any) -> Any:
-    """Return the newest message that waits, None if there is none; nobody spins."""
+    """Return the newest waiting message, None if there is none; no executor spins."""
     found = None
     with subscription.handle:
         for _ in range(MOST):
@@ -58,7 +58,7 @@ def newest(subscription: Any) -> Any:
 
 
 def ignore(_message: Any) -> None:
-    """Nobody spins the node."""
+    """The node is not spun."""
 
 
 def participant(node: Node) -> str:
@@ -81,23 +81,23 @@ def sender(info: Any) -> str:
 
 
 # --------------------
-# The guard as the commanding process sees it.
+# The guard, for the commanding process.
 
 TWIST_GUARD_NODE = 'arm_guard'
 MOVING, RESTING = b'm', b'r'
 PERIOD_S = 0.01
 ANSWER_S = 0.05
-# So long a guard may say nothing before it counts as hung. Beside two busy processes it was silent for more than 0.5 s
-# in two of eight runs; an explorer that dies in that time, too, is what the timeout of the controller, where there is
-# one, and the limits of the robot are for. A guard that has ended is noticed at once.
-SILENT_S = {True: 3.0, False: 1.5}  # with a controller that stops by itself, and with one that does not
+# Longest silence of a guard before it counts as hung. Next to two busy processes it was silent for more than 0.5 s
+# in two of eight runs; if the explorer also dies in that time, the timeout of the controller, where there is
+# one, and the limits of the robot remain. A guard that has ended is detected at once.
+SILENT_S = {True: 3.0, False: 1.5}  # with a controller that has a timeout, and with one that has none
 GIVE_UP_S = 60.0  # without a pose that shows rest
 SCOPE = ('systemd-run', '--user', '--scope', '--quiet', '--collect')
 
 
 @functools.cache
 def scope() -> tuple[str, ...]:
-    """Return what starts a process in a control group of its own, nothing where systemd does not offer that."""
+    """Return the command prefix for a separate control group, nothing where systemd does not offer that."""
     with contextlib.suppress(OSError, subprocess.TimeoutExpired):
         if subprocess.run([*SCOPE, 'true'], capture_output=True, timeout=LEAVE_S, check=False).returncode == 0:
             return SCOPE
@@ -105,15 +105,15 @@ def scope() -> tuple[str, ...]:
 
 
 class TwistGuard(GuardProcess):
-    """The guard of one arm; nothing may be commanded to those whom it does not reach, or once it has ended."""
+    """The guard of one arm; no controller may be commanded that it does not reach, or once it has ended."""
 
     def __init__(
         self, heartbeat_s: float, namespace: str, topics: tuple[str, ...], *, patient: bool = False, lock: int = -1
     ) -> None:
-        # In a control group of its own, if possible: what ends all processes of a service must not end the guard first.
+        # In a separate control group, if possible: what ends all processes of a service must not end the guard first.
         holds = (lock,) if lock >= 0 else ()
         super().__init__(__name__, str(heartbeat_s), namespace, *topics, start=scope(), holds=holds)
-        self.reached = 0  # how many who listen it has found; that takes a while, which must not come after a death
+        self.reached = 0  # subscribers that it has found; discovery takes a while and must precede a failure
         self.participant = ''
         self.garbled = 0  # answers that could not be read
         self._silent_s = SILENT_S[patient]
@@ -140,9 +140,9 @@ class TwistGuard(GuardProcess):
         return ''
 
     def beat(self, *, moving: bool) -> None:
-        """Tell that the commanding process lives, and whether the arm may still move."""
+        """Send a heartbeat and whether the arm may still move."""
         self._moving = moving
-        with contextlib.suppress(OSError):  # a full line or a dead guard, which `fault` tells
+        with contextlib.suppress(OSError):  # a full socket or a dead guard, which `fault` reports
             self.line.send(MOVING if moving else RESTING)
 
     def leave(self) -> None:
@@ -185,7 +185,7 @@ def main() -> None:
 
     line.setblocking(False)
     guarded(line, float(heartbeat_s), command_standstill, take_pose, answer)
-    node.destroy_node()  # else ROS shows it for 20 s as another commander
+    node.destroy_node()  # otherwise ROS shows it for 20 s as another commander
     rclpy.shutdown()
 
 
@@ -196,7 +196,7 @@ def guarded(
     take_pose: Callable[[RestWatch], None],
     answer: Callable[[], None],
 ) -> None:
-    """Guard until the other end says that it is done, or has closed and the arm rests; tell it how many listen."""
+    """Guard until the other end is done, or has closed and the arm rests; report the number of subscribers."""
     rest = RestWatch()
     moving, heard_s, answered_s = False, time.monotonic(), 0.0
     while True:
@@ -204,14 +204,14 @@ def guarded(
         now_s = time.monotonic()
         if waiting:
             try:
-                said = line.recv(1)
-            except ConnectionError:  # it ended with an answer unread
-                said = b''
-            if said == DONE:
+                received = line.recv(1)
+            except ConnectionError:  # it ended before it read an answer
+                received = b''
+            if received == DONE:
                 return
-            if not said:
+            if not received:
                 break
-            moving, heard_s = said == MOVING, now_s
+            moving, heard_s = received == MOVING, now_s
             rest.forget()
         elif moving and now_s - heard_s > heartbeat_s and not rest.at_rest:
             take_pose(rest)
@@ -220,7 +220,7 @@ def guarded(
             answered_s = now_s
             answer()
 
-    # Nobody is there any more.
+    # The other end has closed.
     rest.forget()
     end_s = time.monotonic() + GIVE_UP_S
     while not rest.at_rest and time.monotonic() < end_s:
