@@ -229,6 +229,10 @@ CONTAINERS: dict[str, tuple[Write, dict, Truth]] = {
     'a WAV file that was cut': (wav(2 * N + 2000), SOUND, 'declares 3200 bytes of sound and has 1200'),
     'a WAV file of a pipe': (wav(2**32 - 1), SOUND, [('cork', X / 2)]),
     'two sounds': (wav(2 * N, 2), SOUND, 'has 2 chunks of sound'),
+    'trials as one slide': (
+        npz(X=np.ones((20, 100, 3))), {**ANY, 'streams': {'signal': {'columns': ['X.*'], 'rate_hz': 100.0}}},
+        r'20 trials; write slides: \{by: column, column: trial\}',
+    ),
     'a folder': (both(csv(T, X), lambda folder: (folder / 'felt_1.csv').mkdir()), {}, "'felt_1.csv' is a folder"),
 }  # fmt: skip
 
@@ -243,7 +247,11 @@ STORE = message_types()
 
 
 def bag(
-    ahead_s: float = 0.0, drift: float = 0.0, name: str = 'a_1', plugin: StoragePlugin = StoragePlugin.MCAP
+    ahead_s: float = 0.0,
+    drift: float = 0.0,
+    name: str = 'a_1',
+    plugin: StoragePlugin = StoragePlugin.MCAP,
+    frames: int = 1,
 ) -> Write:
     """Write a bag whose device has another clock than the recorder, which names cork and, after 3 s, felt."""
     types = STORE.types
@@ -260,7 +268,7 @@ def bag(
                     word = STORE.serialize_cdr(types[WORD](data='felt' if row else 'cork'), WORD)
                     writer.write(words, log_ns - 10**6, word)
                 stamp_ns = log_ns + round(ahead_s * 1e9) + round(drift * row * STEP_NS)
-                stamp = header(stamp=time(sec=stamp_ns // 10**9, nanosec=stamp_ns % 10**9), frame_id='')
+                stamp = header(stamp=time(sec=stamp_ns // 10**9, nanosec=stamp_ns % 10**9), frame_id='ab'[row % frames])
                 value = types[POINT](header=stamp, point=point(x=x, y=0.0, z=0.0))
                 writer.write(points, log_ns, STORE.serialize_cdr(value, POINT))
 
@@ -281,9 +289,21 @@ def emptied(folder: Path) -> None:
     (folder / 'a_1' / 'metadata.yaml').write_text('')
 
 
+def mp3(folder: Path) -> None:
+    kind, rng = 'audio_common_msgs/msg/AudioData', np.random.default_rng(0)
+    with Writer(folder / 'a_1', version=8, storage_plugin=StoragePlugin.MCAP) as writer:
+        connection = writer.add_connection('/p', kind, typestore=STORE)
+        for number in range(20):
+            data = np.r_[np.array([0xFF, 0xFB], np.uint8), rng.integers(0, 256, 416).astype(np.uint8)]
+            value = STORE.types[kind](data=data)
+            writer.write(connection, START_NS + number * STEP_NS, STORE.serialize_cdr(value, kind))
+
+
 BAGS: dict[str, tuple[Write, Truth]] = {
     'a clock one hour ahead': (bag(3600.0), HALVES),
     'a clock that began at the start': (bag(-1.7e9 + 100.0), HALVES),
+    'sensors of two frames': (bag(frames=2), r"have the frames a, b.*rows: \{'/p/header.frame_id': 'a'\}"),
+    'packed sound': (mp3, 'it is MP3 and no plain sound'),
     'a clock that is faster': (bag(3600.0, 0.5), r"topic '/p': the stamps differ .* and that changes by 2\.\d+ s"),
     'empty metadata': (both(bag(), emptied), HALVES),
     'several files without metadata': (
@@ -303,6 +323,37 @@ def test_bags(tmp_path: Path, name: str) -> None:
     label = {'label': {'column': '/surface/data'}, 'slides': {'by': 'column', 'column': '/surface/data'}}
     streams = {'signal': {'columns': ['/p/point.x']}}
     check(tmp_path, write, {'files': '{a}_{run}', 'streams': streams, **label}, truth, 'bag')
+
+
+def arrays(folder: Path, first: str, second: str) -> None:
+    types, kind = STORE.types, 'std_msgs/msg/Float32MultiArray'
+    layout, dimension = types['std_msgs/msg/MultiArrayLayout'], types['std_msgs/msg/MultiArrayDimension']
+    with Writer(folder / 'cork_1', version=8, storage_plugin=StoragePlugin.MCAP) as writer:
+        connection = writer.add_connection('/a', kind, typestore=STORE)
+        for number, part in enumerate(np.split(np.c_[X, Y].astype(np.float32), 60)):
+            data = part.T if first != 'samples' else part
+            axes = [
+                dimension(label=label, size=size, stride=size)
+                for label, size in zip((first, second), data.shape, strict=True)
+            ]
+            value = types[kind](layout=layout(dim=axes, data_offset=0), data=np.ascontiguousarray(data).ravel())
+            writer.write(connection, START_NS + 10 * number * STEP_NS, STORE.serialize_cdr(value, kind))
+
+
+@pytest.mark.parametrize(('first', 'second'), [('samples', 'channels'), ('taxels', 'time'), ('', '')])
+def test_arrays_of_two_dimensions_are_read_as_their_labels_name_them(tmp_path: Path, first: str, second: str) -> None:
+    streams = {'signal': {'columns': ['/a/data.*']}}
+    truth: Truth = [('cork', np.c_[X, Y])] if first else "named '' and '', which does not tell samples"
+    check(
+        tmp_path, lambda folder: arrays(folder, first, second), {'files': '{material}_{run}', 'streams': streams},
+        truth, 'bag',
+    )  # fmt: skip
+
+
+def test_one_of_several_frames_is_chosen(tmp_path: Path) -> None:
+    streams = {'signal': {'columns': ['/p/point.x']}}
+    content = {'files': '{material}_{run}', 'streams': streams, 'rows': {'/p/header.frame_id': 'b'}}
+    check(tmp_path, bag(frames=2, name='cork_1'), content, [('cork', X[1::2])], 'bag')
 
 
 def element(kind: int, content: bytes) -> bytes:

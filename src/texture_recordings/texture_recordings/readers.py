@@ -68,6 +68,7 @@ class TableFrame:
     rate_hz: float = 0.0
     clocks: Mapping[str, str] = field(default_factory=dict)  # column → column of its times, s
     peek: Callable[[str], AnyArray] | None = None  # the first texts of a column
+    trials: int = 0  # of arrays (n_trials, n_samples, n_channels)
 
     def chosen(self, wanted: Sequence[str]) -> list[str]:
         """Return the columns that names, patterns such as 'taxel*' and ranges such as '0-8' mean, in their order."""
@@ -733,6 +734,7 @@ def _frames(
         yield TableFrame(
             within, tuple(columns), partial(columns_of, columns, within), {**of_list, **constants, **fields},
             peek=partial(_first_texts, columns),
+            trials=max((array.shape[0] for array in arrays.values() if array.ndim == 3), default=0),
         )  # fmt: skip
 
 
@@ -823,7 +825,7 @@ def _texts(array: AnyArray) -> AnyArray:
 MAX_FIELDS = 2000  # of one message
 Rows = Mapping[str, AnyArray]  # name → values of one message, (n,) each; n > 1 where it holds consecutive samples
 BROKEN = (struct.error, UnicodeDecodeError, ValueError, IndexError, AssertionError, KeyError, TypeError)
-TIME = 'time'
+TIME, FRAME = 'time', 'header.frame_id'
 
 
 def _collect(value: Any, path: str, found: dict[str, AnyArray]) -> None:
@@ -843,6 +845,31 @@ def _collect(value: Any, path: str, found: dict[str, AnyArray]) -> None:
         found[path] = np.array([value])
 
 
+MP3_MESSAGES = 5  # that begin as MP3 does, which plain sound does not
+TIME_AXES = frozenset(('sample', 'samples', 'time', 'times', 't', 'frame', 'frames'))
+CHANNEL_AXES = frozenset((
+    'channel', 'channels', 'taxel', 'taxels', 'sensor', 'sensors', 'axis', 'axes', 'electrode', 'electrodes',
+))  # fmt: skip
+MP3 = frozenset((0xFBFF - 2**16, 0xFAFF - 2**16, 0xF3FF - 2**16, 0xF2FF - 2**16))  # with which its parts begin
+PLANE = frozenset(('height', 'width', 'row', 'rows', 'column', 'columns', 'col', 'cols', 'x', 'y'))
+
+
+def _in_time(data: AnyArray, axes: Sequence[Any]) -> AnyArray:
+    """Return an array of two dimensions as (n_samples, n_channels), as their labels name them."""
+    first, second = (axis.label.strip().lower() for axis in axes)
+    table: AnyArray = data.reshape([axis.size for axis in axes])
+    if first in TIME_AXES or second in CHANNEL_AXES:
+        return table
+    if second in TIME_AXES or first in CHANNEL_AXES:
+        return table.T
+    if {first, second} <= PLANE or len(table) == 1:
+        return table.reshape(1, -1)  # a sample of a plane of taxels
+    raise InvalidData(
+        f"its dimensions are named '{first}' and '{second}', which does not tell samples from channels; republish it "
+        "with the labels 'samples' and 'channels'"
+    )
+
+
 def _rows_of(value: Any, msgtype: str) -> Rows:
     """Return the values of a message by name; of sound and of arrays with two dimensions, consecutive rows."""
     if msgtype == 'sensor_msgs/msg/JointState':
@@ -852,9 +879,8 @@ def _rows_of(value: Any, msgtype: str) -> Rows:
             for kind in kinds for joint, number in zip(value.name, getattr(value, kind), strict=False)
         }  # fmt: skip
     if msgtype in ('std_msgs/msg/Float32MultiArray', 'std_msgs/msg/Float64MultiArray'):
-        shape = [dim.size for dim in value.layout.dim]
         data = value.data[value.layout.data_offset :]
-        table = data.reshape(shape) if len(shape) == 2 else data[None]
+        table = _in_time(data, value.layout.dim) if len(value.layout.dim) == 2 else data[None]
         if table.shape[1] > MAX_FIELDS:
             raise ValueError(f'it has {table.shape[1]} channels; {MAX_FIELDS} are allowed')
         return {f'data.{number}': table[:, number] for number in range(table.shape[1])}
@@ -891,6 +917,10 @@ def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
     for name, topic in topics.items():
         clock = f'{name}/{TIME}'
         columns[clock] = topic.time_s(first_ns)
+        if f'{name}/{FRAME}' in wanted:
+            columns[f'{name}/{FRAME}'], clocks[f'{name}/{FRAME}'] = topic.frame_ids(), clock
+        else:
+            topic.refuse_frames()
         for part, array in topic.columns().items():
             columns[f'{name}/{part}'] = array
             clocks[f'{name}/{part}'] = clock
@@ -936,6 +966,7 @@ class _Topic:
         self._stamps_ns: list[int] = []
         self._ahead_ns: list[int] = []  # of the time of logging
         self._counts: list[int] = []
+        self._frames: list[str] = []
 
     @property
     def first_ns(self) -> int:
@@ -957,8 +988,13 @@ class _Topic:
         try:
             value = self._types.deserialize_cdr(message.data, self._msgtype)
             rows = _rows_of(value, self._msgtype)
+        except InvalidData as error:
+            raise InvalidData(f'{where}: {error}') from error
         except BROKEN as error:
             raise InvalidData(f'{where} is damaged: {error}; record it again') from error
+        audio = self._msgtype.startswith('audio_common_msgs/msg/AudioData') and len(self._rows) == MP3_MESSAGES
+        if audio and all(round(32768 * one['data'][0]) in MP3 for one in self._rows if len(one['data'])):
+            raise InvalidData(f'{where}: it is MP3 and no plain sound; republish it decoded, in the format wave')
         if self._rows and rows.keys() != self._rows[0].keys():
             other = ', '.join(sorted(rows.keys() ^ self._rows[0].keys())[:5])
             raise InvalidData(f'{where} has other fields than the first: {other}')
@@ -969,6 +1005,20 @@ class _Topic:
         stamped_ns = stamp.sec * NANOSECONDS + stamp.nanosec if stamp else 0
         self._stamps_ns.append(stamped_ns or message.log_ns)
         self._ahead_ns.append(self._stamps_ns[-1] - message.log_ns)
+        self._frames.append(getattr(getattr(value, 'header', None), 'frame_id', ''))
+
+    def frame_ids(self) -> AnyArray:
+        """Return the frame of each row."""
+        return np.repeat(np.array(self._frames), self._counts)
+
+    def refuse_frames(self) -> None:
+        """Refuse messages of several frames, which are of several sensors."""
+        frames = sorted({*self._frames})
+        if len(frames) > 1:
+            raise InvalidData(
+                f'{self.where}: its messages have the frames {", ".join(frames[:4])}, so several sensors may publish '
+                f"there; choose one by rows: {{'{self._name}/{FRAME}': '{frames[0]}'}}"
+            )
 
     def columns(self) -> dict[str, AnyArray]:
         """Return all columns, (n,) each."""

@@ -258,6 +258,8 @@ class FrameSlides:
         self._streams = [self._rated(one) for one in streams]
         self._check_shared_rows()
         self._refuse_alternating()
+        if frame.trials > 1 and mapping.slides.by != 'column' and not self._timed():
+            raise InvalidData(f"'{self._place}' has {frame.trials} trials; write slides: {{by: column, column: trial}}")
         self._reference = next(one for one in self._streams if one.name == self._reference.name)
 
     def slides(self) -> Iterator[tuple[str, ExplorationState, SlideStreams, Conditions]]:
@@ -327,6 +329,9 @@ class FrameSlides:
                     f"the signals of several sensors may alternate; choose one by rows: {{{name}: '{values[0]}'}}, or "
                     f"all of one signal by rows: {{{name}: '*'}}"
                 )
+
+    def _timed(self) -> bool:
+        return all(one.time_s is not None for one in self._streams)
 
     def _check_shared_rows(self) -> None:
         """Refuse stated rates that contradict the rows which two streams without times share."""
