@@ -55,6 +55,16 @@ def test_every_stream_is_imported_again_with_the_same_samples_labels_and_conditi
             assert (one.slide.sensor, one.slide.motion_name) == ('finger', 'linear_slide')
 
 
+def test_a_condition_that_one_slide_lacks_and_labels_that_are_alike_come_back(tmp_path) -> None:
+    forces, labels = [1.5, np.nan, 2.5], ['cork', 'Cork', 'nan']
+    signals = {'signal': [np.full((300, 1), float(number)) for number in range(3)]}
+    given = SlideDataset.from_arrays(signals, labels, {'signal': 1000.0}, force_n=forces)
+    export_slides(given, tmp_path / 'out')
+    report = import_tables(load_mapping(tmp_path / 'out' / 'signal.yaml'), tmp_path / 'out', tmp_path / 'bags')
+    again = {slide.surface: slide.force_n for slide in SlideDataset.from_bags(report.bags)}
+    assert [again[label] for label in labels] == pytest.approx(forces, nan_ok=True)
+
+
 def test_a_slide_that_lost_samples_is_left_out_of_that_stream_and_counted(dataset, tmp_path) -> None:
     [batch] = dataset[0].signals['signal']
     parts = [replace(batch, samples=batch.samples[a:b], first_sample=a) for a, b in ((0, 500), (600, 1000))]

@@ -386,7 +386,7 @@ def _cut_off_file(path: Path) -> Path | None:
             text = CheckedPath(path / 'metadata.yaml').read_text()
         except (OSError, ValueError):
             return None
-        if not re.search(r'^\s*storage_identifier:\s*(""|\'\')?\s*$', text, re.MULTILINE):
+        if text.strip() and not re.search(r'^\s*storage_identifier:\s*(""|\'\')?\s*$', text, re.MULTILINE):
             return None
     files = list(path.glob('*.mcap'))
     return files[0] if len(files) == 1 else None
@@ -488,6 +488,11 @@ def _read(
     try:
         checked = CheckedPath(_cut_off_file(path) or path)
         files = _files(checked)
+        more = {file.name for file in path.glob('*') if file.suffix in ('.mcap', '.db3')} - {
+            file.name for file in files
+        }
+        if foreign and path.is_dir() and more:
+            raise FileRefused(f'{", ".join(sorted(more)[:3])} is not listed in its metadata.yaml; ros2 bag reindex')
         for file in files:
             open_regular(file, None).close()
         with Reader(checked) as reader:

@@ -20,7 +20,11 @@ CLEAR = 0.25  # intervals between the longest step without a loss and the shorte
 SAME_TIME = 0.1  # rows nearer than this share of an interval have one time
 BURST_RATIO, BURST_DUTY, BURST_SHARE, LONGEST_BURST_S = 5.0, 0.25, 0.2, 1.0
 MIN_BURSTS = 4
-MODULI = tuple(2.0**bits / unit for bits in (16, 24, 31, 32) for unit in (1.0, 1e3, 1e6, 1e9))
+MODULI = (
+    *(2.0**bits / unit for bits in (16, 24, 31, 32) for unit in (1.0, 1e3, 1e6, 1e9)),
+    *(86_400.0 * unit for unit in (1.0, 1e3, 1e6, 1e9)),  # times of the day pass midnight
+)
+SAME_RATE = 1.05  # the rate of a quarter of a slide, or of another file, may differ by this factor
 RESET_ROWS = 5  # times that stay behind for longer are those of another run
 MAX_LEFT_OUT = 0.1  # share of the rows
 WIDEST = 1.2  # rows within which the number of rows follows the time, where bursts have several sizes
@@ -38,7 +42,7 @@ class ClockFault(ValueError):
 
 
 def unwrapped(times: Array) -> Array:
-    """Return times of a counter that rolls over at 2^16, 2^24, 2^31 or 2^32 of some unit as ones that go on."""
+    """Return times of a counter that rolls over at 2^16, 2^24, 2^31 or 2^32 of some unit, or a day, without jumps."""
     steps = np.diff(times)
     back, forward = steps[steps < 0], steps[steps > 0]
     if not len(back) or not len(forward):
@@ -104,7 +108,7 @@ def on_grid(
     Jitter of the times is that of the host that stamped them, and not of the device that sampled. ClockFault where the
     times contradict the rate, go back, or lack more samples than there are.
     """
-    kept = _in_order(times)
+    kept = _in_order(times, samples)
     out = int((~kept).sum())
     counts = Counter({'rows out of order': out} if out else {})
     if out and burst_s:
@@ -160,11 +164,31 @@ def on_grid(
             0, f'{len(rows)} rows and {lost} lost samples at {rate_hz:g} Hz take other than the {seconds:.4g} s of '
             f'their times, which are too irregular{TIMES}, or give `rate_hz` in place of the column of time',
         )  # fmt: skip
+    _check_steady(times[rows], index, rate_hz, burst_s)
     counts |= {'samples': len(index), 'lost': lost}
     return rows, index - (index[0] if len(index) else 0), counts
 
 
-def _in_order(times: Array) -> AnyArray:
+def _check_steady(times: Array, index: AnyArray, rate_hz: float, burst_s: float) -> None:
+    """Refuse a slide in which the rate changes, so that rows would be placed at other times than their own."""
+    quarter = len(index) // 4
+    if quarter < 2 * MIN_BURSTS:
+        return
+    for first in range(0, 4 * quarter, quarter):
+        part = slice(first, first + quarter)
+        since = times[part] - times[first]
+        if since[-1] <= 0:
+            continue
+        found_hz = float(np.polyfit(since, index[part].astype(float), 1)[0])
+        samples = abs(found_hz - rate_hz) * since[-1]
+        if not 1 / SAME_RATE <= found_hz / rate_hz <= SAME_RATE and samples > 3.0 + 2.0 * burst_s * rate_hz:
+            raise ClockFault(
+                first, f'the rate changes within a slide: {found_hz:.4g} Hz from here, {rate_hz:g} Hz over all; cut '
+                'the slides where it changes, and give each rate a mapping',
+            )  # fmt: skip
+
+
+def _in_order(times: Array, samples: AnyArray) -> AnyArray:
     """Return the rows, as a mask, of the longest sequence in which times do not go back."""
     kept = np.ones(len(times), dtype=bool)
     if not (np.diff(times) < 0).any():
@@ -184,6 +208,9 @@ def _in_order(times: Array) -> AnyArray:
     # Of two rows that only contradict each other nobody knows which one is wrong.
     for row in np.flatnonzero(~kept).tolist():
         near = slice(max(0, row - 1000), row + 1001)
+        same = kept[near] & (times[near] == times[row])
+        if (samples[near][same] == samples[row]).all(axis=1).any():
+            continue  # a row that is there twice
         earlier = np.arange(near.start, near.start + len(times[near])) < row
         partners = np.flatnonzero(kept[near] & np.where(earlier, times[near] > times[row], times[near] < times[row]))
         if len(partners) == 1:
@@ -299,9 +326,13 @@ def _rest(times: Array, numbers: AnyArray) -> Array:
 
 
 def _tick_s(times: Array) -> float:
-    """Return the decimal step in which times count: 1, 0.1 … s; 0 below a microsecond."""
+    """Return the step in which times count: 1, 0.1 … s, or as floats of 32 bits 1/2, 1/4 …; 0 below a microsecond."""
     since = times - times[0]
-    return next((0.1**n for n in range(7) if np.abs(since * 10**n - np.rint(since * 10**n)).max() < 1e-6 * 10**n), 0.0)
+    decimal = next(
+        (0.1**n for n in range(7) if np.abs(since * 10**n - np.rint(since * 10**n)).max() < 1e-6 * 10**n), 0.0
+    )
+    binary = next((0.5**n for n in range(20) if not (np.ldexp(times, n) % 1.0).any()), 0.0)
+    return max(decimal, binary)
 
 
 def _uneven_bursts(times: Array, starts: AnyArray, counts: AnyArray, twins: bool) -> tuple[AnyArray, AnyArray]:

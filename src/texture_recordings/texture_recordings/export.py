@@ -110,15 +110,17 @@ def _mapping(topic: str, samples: Sequence[SlideSamples]) -> Mapping[str, Any]:
     known = {
         name: {'column': column}
         for name, column in CONDITION_COLUMNS.items()
-        if all(math.isfinite(getattr(one, column)) for one in samples)
+        if any(math.isfinite(getattr(one, column)) for one in samples)
     }
     channels = list(first.channels)
+    names = {one.surface: one.surface for one in samples}  # also those that differ in case alone
     stream = {
         'columns': channels, 'channels': channels, 'unit': batch.common_unit, 'rate_hz': first.rate_hz,
         'samples_per_row': 1,
     }  # fmt: skip
     return {
-        'files': f'{topic}.parquet', 'streams': {topic: stream}, 'label': {'column': 'surface'},
-        'slides': {'by': 'column', 'column': 'slide', 'min_s': 0.0}, 'conditions': known, 'session': 'session',
+        'files': f'{topic}.parquet', 'streams': {topic: stream}, 'label': {'column': 'surface', 'names': names},
+        'slides': {'by': 'column', 'column': 'slide', 'min_s': 0.0}, 'conditions': known,
+        'session': 'session' if all(one.slide.session for one in samples) else '',
         'sensor': first.slide.sensor, 'motion': first.slide.motion_name,
     }  # fmt: skip

@@ -149,7 +149,8 @@ class LabelColumn:
     names: Mapping[str, str] = field(
         default_factory=dict,
         metadata={
-            'description': 'Names of labels by their codes, such as {0: cork, 1: felt}; others stay as they are.'
+            'description': 'Names of labels by their codes, such as {0: cork, 1: felt}; other texts stay, and other '
+            'numbers are refused.'
         },
     )
 
@@ -187,7 +188,7 @@ class Quantity:
 
 # Factor to the SI unit, by the name of the condition.
 CONDITION_UNITS: Mapping[str, Mapping[str, float]] = {
-    'speed': {'m/s': 1.0, 'cm/s': 1e-2, 'mm/s': 1e-3},
+    'speed': {'m/s': 1.0, 'cm/s': 1e-2, 'mm/s': 1e-3, 'mm/min': 1e-3 / 60.0},
     'force': {'N': 1.0, 'mN': 1e-3, 'gf': 9.80665e-3, 'kgf': 9.80665},
     'direction': {'rad': 1.0, 'deg': 0.017453292519943295},
 }

@@ -14,11 +14,11 @@ import re
 import struct
 import warnings
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import islice
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +54,7 @@ class Columns:
     lines: AnyArray | None = None  # number in the file of each row
     junk: AnyArray | None = None  # rows with something that is no number
     reasons: Mapping[int, str] = field(default_factory=dict)  # of the first such rows, by line
+    outside: Sequence[int] = ()  # lines above the first sample or below the last one, such as units or sums
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +67,8 @@ class TableFrame:
     fields: Mapping[str, str] = field(default_factory=dict)
     rate_hz: float = 0.0
     clocks: Mapping[str, str] = field(default_factory=dict)  # column → column of its times, s
+    peek: Callable[[str], AnyArray] | None = None  # the first texts of a column
+    trials: int = 0  # of arrays (n_trials, n_samples, n_channels)
 
     def chosen(self, wanted: Sequence[str]) -> list[str]:
         """Return the columns that names, patterns such as 'taxel*' and ranges such as '0-8' mean, in their order."""
@@ -139,6 +142,11 @@ def _unreadable(place: str, error: Exception) -> InvalidData:
 
 Line = tuple[int, str]  # its number in the file, from 1
 BLANK = frozenset(('', 'nan', 'na', 'null', 'none'))
+NO_TEXT = frozenset(('nan', 'na', 'n/a', '#n/a', 'null'))  # 'none' may be a label
+EDGE_ROWS = 20  # at the top and the end of a file, which may be units, sums or a row that was cut off
+THOUSANDS = re.compile(r'[+-]?[1-9]\d{0,2}(,\d{3})+')
+FEW_ROWS = 5
+PEEK_ROWS = 2000
 
 
 def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:
@@ -153,16 +161,39 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise InvalidData(f"'{place}' has the column '{twice}' twice; give each column a different name")
-    yield TableFrame(place, names, partial(_csv_columns, path, place, form, names, take))
+    if len(names) > MAX_CHANNELS:
+        raise InvalidData(f"'{place}' has {len(names)} columns; at most {MAX_CHANNELS} are read, split it")
+    if form.header and _are_samples(names):
+        raise InvalidData(
+            f"'{place}': the first row is {', '.join(names[:3])[:60]}, which are numbers and no names; write "
+            'format: {header: false}, or skip fewer rows'
+        )
+    timed = all(stream.time.column for stream in mapping.streams.values())
+
+    def peek(name: str) -> AnyArray:
+        with _lines(path, form) as lines:
+            rows = [_row(_cells(line, form.delimiter), len(names)) for _, line in islice(lines, 1, PEEK_ROWS)]
+        return np.array([row[names.index(name)] for row in rows if row])
+
+    yield TableFrame(place, names, partial(_csv_columns, path, place, form, names, take, timed), peek=peek)
+
+
+def _are_samples(names: Sequence[str]) -> bool:
+    """Return whether the names of columns are numbers, and not such that count up."""
+    values = np.array([_number(name) for name in names])
+    plain = all(name.isdigit() for name in names) and (np.diff(values) == 1).all()
+    return bool(np.isfinite(values).all()) and not plain
 
 
 def _csv_columns(  # noqa: PLR0917 – bound one after the other
-    path: Path, place: str, form: FileFormat, names: Sequence[str], take: Take, numbers: Sequence[str],
-    texts: Sequence[str],
+    path: Path, place: str, form: FileFormat, names: Sequence[str], take: Take, timed: bool,
+    numbers: Sequence[str], texts: Sequence[str],
 ) -> Columns:  # fmt: skip
     at = {name: number for number, name in enumerate(names)}
     blocks: list[dict[str, AnyArray]] = []
     reasons: dict[int, str] = {}
+    first: list[list[str] | None] = []
+    last: list[list[str] | None] = []
     with _lines(path, form) as lines:
         if form.header:
             next(lines, None)
@@ -170,6 +201,9 @@ def _csv_columns(  # noqa: PLR0917 – bound one after the other
             take(len(block) * (len(numbers) + 2 * len(texts)))
             rows = [_row(_cells(line, form.delimiter), len(names)) for _, line in block]
             read: dict[str, AnyArray] = {'': np.array([number for number, _ in block])}
+            _refuse_other_names(rows, names, block, place, timed=timed)
+            if not blocks and form.delimiter == ',':
+                _refuse_split_decimals(rows, names, place)
             junk = np.array([row is None for row in rows])
             found = {
                 block[index][0]: f"column 'all': {len(_cells(block[index][1], form.delimiter))} cells, {len(names)} "
@@ -177,6 +211,8 @@ def _csv_columns(  # noqa: PLR0917 – bound one after the other
             }  # fmt: skip
             for name in numbers:
                 read[f'number {name}'] = values = _parsed(rows, at[name], form.decimal)
+                if form.decimal == ',':
+                    _refuse_thousands(rows, at[name], f"'{place}', column '{name}'")
                 for index in np.flatnonzero(np.isnan(values)).tolist():
                     cell = rows[index][at[name]] if rows[index] else ''
                     if cell.lower() in BLANK:
@@ -194,19 +230,121 @@ def _csv_columns(  # noqa: PLR0917 – bound one after the other
             for name in texts:
                 read[f'text {name}'] = np.array(
                     [
-                        None if row is None or left_out else row[at[name]][:MAX_TEXT].replace('\0', '')
+                        None if row is None or left_out else _text(row[at[name]])
                         for row, left_out in zip(rows, empty, strict=True)
                     ]
                 )
-            blocks.append({**read, 'junk': junk})
+            blocks.append({**read, 'junk': junk, 'empty': empty})
+            first, last = first or rows[:EDGE_ROWS], [*last, *rows][-EDGE_ROWS:]
     if not blocks:
         raise InvalidData(f"'{place}' has no rows below the names of its columns; choose files with samples")
     whole = {key: np.concatenate([read[key] for read in blocks]) for key in blocks[0]}
+    begin, end = _edges(first, last, whole['empty'], form.decimal, timed=timed, cut=_is_cut(path, last))
+    inside, outside = slice(begin, end), [*whole[''][:begin].tolist(), *whole[''][end:].tolist()]
     return Columns(
-        {name: whole[f'number {name}'] for name in numbers},
-        {name: _without_gaps(whole[f'text {name}']) for name in texts},
-        whole[''], whole['junk'], reasons,
+        {name: whole[f'number {name}'][inside] for name in numbers},
+        {name: _without_gaps(whole[f'text {name}'][inside]) for name in texts},
+        whole[''][inside], whole['junk'][inside],
+        {line: reason for line, reason in reasons.items() if line not in outside}, outside,
     )  # fmt: skip
+
+
+def _edges(
+    first: Sequence[list[str] | None],
+    last: Sequence[list[str] | None],
+    empty: AnyArray,
+    decimal: str,
+    *,
+    timed: bool,
+    cut: bool,
+) -> tuple[int, int]:
+    """Return which rows are samples, without rows such as units at the top and sums at the end.
+
+    Such a row has no number in any column that is read, or, where no time tells, a text in a column of numbers.
+    """
+    count = len(empty)
+    whole = [row for row in (*first, *last) if row]
+    if not whole or empty.sum() > 0.5 * count:
+        return 0, count
+
+    def is_number(cell: str) -> bool:
+        return math.isfinite(_number(cell.replace(decimal, '.')))
+
+    numeric = [at for at in range(len(whole[0])) if sum(is_number(row[at]) for row in whole) > 0.7 * len(whole)]
+
+    def odd(row: list[str] | None) -> bool:
+        cells = [row[at] for at in numeric] if row else []
+        return any(cell.lower() not in BLANK and cell[:1].isalpha() and not is_number(cell) for cell in cells)
+
+    begin, end = 0, count - cut
+    few = 0 if timed else FEW_ROWS
+    while begin < min(len(first), count) and (empty[begin] or (begin < few and odd(first[begin]))):
+        begin += 1
+    while end > max(begin, count - len(last)) and (
+        empty[end - 1] or (count - end < few and odd(last[end - 1 - count]))
+    ):
+        end -= 1
+    return begin, end
+
+
+def _is_cut(path: Path, last: Sequence[list[str] | None]) -> bool:
+    """Return whether the last number of a file has fewer digits than those before, and the line has no end."""
+    with open_regular(path) as opened:
+        opened.seek(-1, io.SEEK_END)
+        ended = opened.read() in (b'\n', b'\r', b'\0')
+    digits = [len(row[-1].partition('.')[2]) for row in last if row]
+    return not ended and len(digits) > 5 and len(set(digits[:-1])) == 1 and digits[-1] < digits[0]
+
+
+def _text(cell: str) -> str:
+    return '' if cell.lower() in NO_TEXT else cell[:MAX_TEXT].replace('\0', '')
+
+
+def _refuse_other_names(
+    rows: Sequence[list[str] | None], names: Sequence[str], block: Sequence[Line], place: str, *, timed: bool
+) -> None:
+    """Refuse a file of which a part has other columns, or of which parts follow each other without any time."""
+    known = frozenset(names)
+    for (line, _), row in zip(block, rows, strict=True):
+        if not row or known.isdisjoint(row) or any(math.isfinite(_number(cell)) for cell in row):
+            continue
+        again = [cell.lstrip('\ufeff') for cell in row]
+        if again != list(names) and len(known.intersection(again)) > 0.3 * len(names):
+            raise InvalidData(
+                f"'{place}', row {line}: names of columns come again, and are {', '.join(again[:5])} from there on; "
+                'split the file there'
+            )
+        if again == list(names) and not timed:
+            raise InvalidData(
+                f"'{place}', row {line}: the names of the columns come again, so another recording may begin there; "
+                'split the file, or name the column of time'
+            )
+
+
+def _refuse_split_decimals(rows: Sequence[list[str] | None], names: Sequence[str], place: str) -> None:
+    """Refuse columns that hold the decimals of the column before, as of commas that are decimal and delimiters."""
+    for at in range(1, len(names)):
+        pairs = [(row[at - 1], row[at]) for row in rows if row]
+        widths = {len(cell) for _, cell in pairs}
+        if len(pairs) < 10 or len(widths) > 1 or max(widths) < 2:
+            continue
+        digits = all(cell.isdigit() and before.lstrip('+-').isdigit() for before, cell in pairs)
+        counts = all(one[1] <= other[1] for one, other in pairwise(pairs))
+        if digits and not counts and any(cell.startswith('0') for _, cell in pairs):
+            raise InvalidData(
+                f"'{place}': the column '{names[at]}' holds digits such as {pairs[0][1]}, so commas may be decimal as "
+                'well as between columns; save it with another delimiter'
+            )
+
+
+def _refuse_thousands(rows: Sequence[list[str] | None], at: int, where: str) -> None:
+    """Refuse commas that separate thousands where they are read as decimal."""
+    cells = [row[at] for row in rows if row]
+    commas = [cell for cell in cells if ',' in cell]
+    if commas and len(commas) < len(cells) and all(THOUSANDS.fullmatch(cell) for cell in commas):
+        raise InvalidData(
+            f"{where}: the comma of '{commas[0]}' seems to separate thousands; save numbers without such commas"
+        )
 
 
 CP1252 = 'texture-cp1252'  # what is no UTF-8 is read as Windows of Western Europe writes it, such as 'm/s²'
@@ -234,7 +372,7 @@ def _lines(path: Path, form: FileFormat) -> Iterator[Iterator[Line]]:
                 for number, line in enumerate(text, 1)
                 if number > form.skip_rows
                 and (bare := line.rstrip('\n')).strip()
-                and not (form.comment and bare.startswith(form.comment))
+                and not (form.comment and bare.startswith(form.comment) and bare[:4].upper() != '#N/A')
             )
 
 
@@ -261,9 +399,11 @@ def _row(cells: list[str], count: int) -> list[str] | None:
 
 
 def _parsed(rows: Sequence[list[str] | None], place: int, decimal: str) -> Array:
-    cells = ['nan' if row is None else row[place].replace(decimal, '.') for row in rows]
+    cells = ['nan' if row is None else row[place] for row in rows]
+    if decimal != '.':  # '1.234' may be a thousand
+        cells = ['?' if '.' in cell else cell.replace(decimal, '.') for cell in cells]
     try:
-        values = np.array(list(map(float, cells)))
+        values = np.array([math.nan if '_' in cell else float(cell) for cell in cells])  # Python reads '1_0' as 10
     except ValueError:
         values = np.array([_number(cell) for cell in cells])
     values[~np.isfinite(values)] = np.nan
@@ -272,7 +412,7 @@ def _parsed(rows: Sequence[list[str] | None], place: int, decimal: str) -> Array
 
 def _number(cell: str) -> float:
     try:
-        return float(cell)
+        return math.nan if '_' in cell else float(cell)
     except ValueError:
         return math.nan
 
@@ -296,7 +436,7 @@ def _read_numpy(path: Path, place: str, mapping: TableMapping, take: Take) -> It
         version = np.lib.format.read_magic(file)  # type: ignore[no-untyped-call]
         read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
         shape, _, dtype = read(file)  # type: ignore[no-untyped-call]
-        take(math.prod(shape) * max(1.0, dtype.itemsize / 8))
+        take(math.prod(max(1, length) for length in shape) * max(1.0, dtype.itemsize / 8))
 
     with open_regular(path) as opened:
         if path.suffix.lower() == '.npy':
@@ -330,11 +470,19 @@ def _read_mat(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
     yield from _frames(tuple(arrays), arrays.__getitem__, place, mapping)
 
 
+# The flags of an array of cells (1), structs (2) or objects (3) and its two sizes, by the order of bytes.
+NESTED = {
+    '<': re.compile(rb'\x06\0\0\0\x08\0\0\0[\1-\3].{3}.{4}\x05\0\0\0\x08\0\0\0(.{8})', re.DOTALL),
+    '>': re.compile(rb'\0\0\0\x06\0\0\0\x08.{3}[\1-\3].{4}\0\0\0\x05\0\0\0\x08(.{8})', re.DOTALL),
+}
+
+
 def _unpacked_bytes(file: Any, place: str) -> int:
     """Return how many bytes the variables of a MATLAB file (version 5 to 7) unpack to, without keeping them."""
     file.seek(124)
     order = '<' if file.read(4)[2:] == b'IM' else '>'
     total = arrays = 0
+    before = b''
     element = struct.pack(f'{order}I', 14)
     while len(tag := file.read(8)) == 8:
         kind, length = struct.unpack(f'{order}II', tag)
@@ -345,12 +493,26 @@ def _unpacked_bytes(file: Any, place: str) -> int:
             while packed:
                 part = unpacker.decompress(packed, 1 << 20) if kind == 15 else packed
                 total, arrays = total + len(part), arrays + part.count(element)
+                for match in NESTED[order].finditer(before + part):
+                    count = math.prod(struct.unpack(f'{order}2i', match[1]))
+                    if count > MAX_ARRAYS:
+                        raise InvalidData(
+                            f"'{place}' declares an array of {count} cells or structs; at most "
+                            f'{MAX_ARRAYS} are read, split it'
+                        )
+                before = part[-64:]
                 packed = unpacker.unconsumed_tail if kind == 15 else b''
         file.seek(after)
     from scipy.io import whosmat  # noqa: PLC0415 – recording needs no scipy
 
     file.seek(0)
-    nested = any(kind in ('cell', 'struct', 'object') for _, _, kind in whosmat(file))
+    listed = whosmat(file)
+    for name, shape, kind in listed:
+        if kind != 'sparse' and math.prod(shape) > max(MAX_VALUES, total):
+            raise InvalidData(
+                f"'{place}' declares {math.prod(shape) / 1e6:.0f} million values of '{name}', and lacks them"
+            )
+    nested = any(kind in ('cell', 'struct', 'object') for _, _, kind in listed)
     if nested and arrays > MAX_ARRAYS:
         raise InvalidData(f"'{place}' has more than {MAX_ARRAYS} arrays in cells and structs; split it")
     return total
@@ -417,11 +579,14 @@ def _read_hdf5(
             if member.is_virtual or member.external:
                 raise InvalidData(f"'{place}': data set '{name}' lies in another file; copy it into this one")
             texts = h5py.check_string_dtype(member.dtype) is not None and member.dtype.kind == 'O'
-            take(member.size * max(1.0, member.dtype.itemsize / 8) * (4 if texts else 1))
+            declared = math.prod(max(1, length) for length in member.shape or ())
+            take(declared * max(1.0, member.dtype.itemsize / 8) * (4 if texts else 1))
+            if matlab and member.attrs.get('MATLAB_empty'):
+                return np.empty(0)
             if matlab and member.attrs.get('MATLAB_class') == b'char':
                 return np.array(''.join(map(chr, np.asarray(member[()]).ravel().tolist())))
             if not texts:
-                array = np.asarray(member[()])
+                array = _as_meant(member, np.asarray(member[()]))
                 return array.T if matlab else array
             cells = member.asstr(errors='replace')
             if not member.shape:
@@ -431,11 +596,61 @@ def _read_hdf5(
         yield from _frames(list(found), load, place, mapping)
 
 
+SCALED = {'scale_factor': 1.0, 'add_offset': 0.0}  # attributes by the CF conventions
+
+
+def _as_meant(member: Any, array: AnyArray) -> AnyArray:
+    """Return the values of a data set as its attributes scale them, NaN where none was ever written."""
+    if array.dtype.kind not in 'iuf' or not array.size:
+        return array
+    missing = np.zeros(array.shape, dtype=bool)
+    if member.chunks:
+        stored = member.id.get_num_chunks()
+        if stored < math.prod(-(-length // size) for length, size in zip(member.shape, member.chunks, strict=True)):
+            missing[:] = True
+            for number in range(stored):
+                begin = member.id.get_chunk_info(number).chunk_offset
+                missing[tuple(slice(a, a + size) for a, size in zip(begin, member.chunks, strict=True))] = False
+    elif not member.id.get_storage_size():
+        missing[:] = True
+    for name in ('_FillValue', 'missing_value'):
+        if name in member.attrs:
+            missing |= np.isin(array, np.ravel(member.attrs[name]))
+    scale, offset = (float(np.ravel(member.attrs.get(name, plain))[0]) for name, plain in SCALED.items())
+    if not missing.any() and (scale, offset) == (1.0, 0.0):
+        return array
+    return np.where(missing, np.nan, array * scale + offset)
+
+
+def _check_wav(file: Any, place: str) -> None:
+    """Refuse a WAV file that was cut off, or that holds several sounds."""
+    size = file.seek(0, io.SEEK_END)
+    file.seek(0)
+    order = '>' if file.read(12)[:4] == b'RIFX' else '<'
+    sounds = 0
+    while len(head := file.read(8)) == 8:
+        name, length = struct.unpack(f'{order}4sI', head)
+        left = size - file.tell()
+        if name == b'data' and length == 2**32 - 1:  # of a program that wrote to a pipe
+            sounds += 1
+            break
+        if name == b'data' and length > left:
+            raise InvalidData(
+                f"'{place}' was cut off: it declares {length} bytes of sound and has {left}; copy it again"
+            )
+        sounds += name == b'data'
+        file.seek(length + length % 2, io.SEEK_CUR)
+    if sounds != 1:
+        raise InvalidData(f"'{place}' has {sounds} chunks of sound, one is needed; save it again as a plain WAV file")
+    file.seek(0)
+
+
 def _read_wav(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:
     from scipy.io import wavfile  # noqa: PLC0415 – recording needs no scipy
 
     with open_regular(path) as opened, warnings.catch_warnings():
         warnings.simplefilter('ignore')  # chunks that it does not know
+        _check_wav(opened, place)
         rate_hz, samples = wavfile.read(opened)
     take(samples.size)
     if not 0 < rate_hz <= MAX_HZ:
@@ -503,19 +718,24 @@ def _frames(
         )
     # What has an element for each of the numbered frames, such as a list of their labels, holds for each its own.
     grouped = {name for _, members in groups.values() for name in members.values()}
-    listed = {}
-    if mapping.tables and all(set(fields) and all(map(str.isdigit, fields.values())) for fields, _ in groups.values()):
+    listed, numbered = {}, [[*fields.values()] for fields, _ in groups.values()]
+    single = mapping.tables and all(len(one) == 1 and one[0].isdigit() for one in numbered)
+    ordered = sorted(int(one[0]) for one in numbered) if single else [-1]
+    base = ordered[0]  # elements count from 0 or 1
+    if base in (0, 1) and ordered == [*range(base, base + len(ordered))]:
         lists = {name: load(name).ravel() for name in names if name not in grouped and '/' not in name}
         listed = {name: array for name, array in lists.items() if len(array) == len(groups)}
     for table, (fields, members) in sorted(groups.items()):
         within = f'{place}, {table}' if table else place
         arrays = {column: _arranged(load(name), mapping.format, within) for column, name in members.items()}
         columns, constants = _unfolded_columns(arrays, within)
-        number = int(next(iter(fields.values()))) if listed else 0
-        of_list = {name: str(array[number - 1])[:MAX_TEXT] for name, array in listed.items() if number <= len(array)}
+        number = int(next(iter(fields.values()))) - base if listed else 0
+        of_list = {name: str(array[number])[:MAX_TEXT] for name, array in listed.items()}
         yield TableFrame(
-            within, tuple(columns), partial(columns_of, columns, within), {**of_list, **constants, **fields}
-        )
+            within, tuple(columns), partial(columns_of, columns, within), {**of_list, **constants, **fields},
+            peek=partial(_first_texts, columns),
+            trials=max((array.shape[0] for array in arrays.values() if array.ndim == 3), default=0),
+        )  # fmt: skip
 
 
 def _arranged(array: AnyArray, form: FileFormat, place: str) -> AnyArray:
@@ -536,12 +756,12 @@ def _unfolded_columns(arrays: Mapping[str, AnyArray], place: str) -> tuple[dict[
     trials = next((array.shape[:2] for array in arrays.values() if array.ndim == 3), None)
     for name, array in arrays.items():
         if array.dtype.names:
-            columns |= {_joined(name, part): array[part].ravel() for part in array.dtype.names}
+            columns |= _parts(array, name)
         elif array.size == 1:
             constants[name] = str(array.item())[:MAX_TEXT]
         elif trials and array.ndim <= 2 and array.size == trials[0]:
             columns[name] = np.repeat(array.ravel(), trials[1])
-        elif array.ndim == 1 or (array.ndim == 2 and 1 in array.shape):
+        elif array.ndim == 1 or (array.ndim == 2 and (1 in array.shape or not array.size)):
             columns[name or '0'] = array.ravel()
         elif array.ndim not in (2, 3) or array.shape[-1] > MAX_CHANNELS:
             raise InvalidData(
@@ -554,6 +774,23 @@ def _unfolded_columns(arrays: Mapping[str, AnyArray], place: str) -> tuple[dict[
     if trials:
         columns[TRIAL] = np.repeat(np.arange(trials[0]), trials[1])
     return columns, constants
+
+
+def _first_texts(columns: Mapping[str, AnyArray], name: str) -> AnyArray:
+    return _texts(columns[name][:PEEK_ROWS])
+
+
+def _parts(array: AnyArray, name: str) -> dict[str, AnyArray]:
+    """Return the members of an array of records as columns, of several values in a row a column for each."""
+    found: dict[str, AnyArray] = {}
+    rows = array.size if array.size in array.shape else len(array)
+    for part in array.dtype.names or ():
+        flat = array[part].reshape(rows, -1)
+        if flat.shape[1] > MAX_CHANNELS:
+            raise InvalidData(f"'{_joined(name, part)}' has {flat.shape[1]} values in a row; split it")
+        one = flat.shape[1] == 1
+        found |= {_joined(name, part if one else f'{part}.{k}'): flat[:, k] for k in range(flat.shape[1])}
+    return found
 
 
 def _joined(name: str, part: str) -> str:
@@ -575,8 +812,10 @@ def columns_of(columns: Mapping[str, AnyArray], place: str, numbers: Sequence[st
 def _texts(array: AnyArray) -> AnyArray:
     if array.dtype.kind == 'S':
         return np.char.decode(array, 'utf-8', 'replace')
-    if array.dtype.kind == 'f' and np.array_equal(array, np.round(array)):  # 3.0 is meant as 3
-        return array.astype(np.int64).astype(str)
+    if array.dtype.kind == 'f':
+        known = np.isfinite(array)
+        whole = np.array_equal(array[known], np.round(array[known]))  # 3.0 is meant as 3
+        return np.where(known, np.where(known, array, 0.0).astype(np.int64 if whole else float).astype(str), '')
     return array.astype(str)
 
 
@@ -586,7 +825,7 @@ def _texts(array: AnyArray) -> AnyArray:
 MAX_FIELDS = 2000  # of one message
 Rows = Mapping[str, AnyArray]  # name → values of one message, (n,) each; n > 1 where it holds consecutive samples
 BROKEN = (struct.error, UnicodeDecodeError, ValueError, IndexError, AssertionError, KeyError, TypeError)
-TIME = 'time'
+TIME, FRAME = 'time', 'header.frame_id'
 
 
 def _collect(value: Any, path: str, found: dict[str, AnyArray]) -> None:
@@ -606,6 +845,31 @@ def _collect(value: Any, path: str, found: dict[str, AnyArray]) -> None:
         found[path] = np.array([value])
 
 
+MP3_MESSAGES = 5  # that begin as MP3 does, which plain sound does not
+TIME_AXES = frozenset(('sample', 'samples', 'time', 'times', 't', 'frame', 'frames'))
+CHANNEL_AXES = frozenset((
+    'channel', 'channels', 'taxel', 'taxels', 'sensor', 'sensors', 'axis', 'axes', 'electrode', 'electrodes',
+))  # fmt: skip
+MP3 = frozenset((0xFBFF - 2**16, 0xFAFF - 2**16, 0xF3FF - 2**16, 0xF2FF - 2**16))  # with which its parts begin
+PLANE = frozenset(('height', 'width', 'row', 'rows', 'column', 'columns', 'col', 'cols', 'x', 'y'))
+
+
+def _in_time(data: AnyArray, axes: Sequence[Any]) -> AnyArray:
+    """Return an array of two dimensions as (n_samples, n_channels), as their labels name them."""
+    first, second = (axis.label.strip().lower() for axis in axes)
+    table: AnyArray = data.reshape([axis.size for axis in axes])
+    if first in TIME_AXES or second in CHANNEL_AXES:
+        return table
+    if second in TIME_AXES or first in CHANNEL_AXES:
+        return table.T
+    if {first, second} <= PLANE or len(table) == 1:
+        return table.reshape(1, -1)  # a sample of a plane of taxels
+    raise InvalidData(
+        f"its dimensions are named '{first}' and '{second}', which does not tell samples from channels; republish it "
+        "with the labels 'samples' and 'channels'"
+    )
+
+
 def _rows_of(value: Any, msgtype: str) -> Rows:
     """Return the values of a message by name; of sound and of arrays with two dimensions, consecutive rows."""
     if msgtype == 'sensor_msgs/msg/JointState':
@@ -615,9 +879,8 @@ def _rows_of(value: Any, msgtype: str) -> Rows:
             for kind in kinds for joint, number in zip(value.name, getattr(value, kind), strict=False)
         }  # fmt: skip
     if msgtype in ('std_msgs/msg/Float32MultiArray', 'std_msgs/msg/Float64MultiArray'):
-        shape = [dim.size for dim in value.layout.dim]
         data = value.data[value.layout.data_offset :]
-        table = data.reshape(shape) if len(shape) == 2 else data[None]
+        table = _in_time(data, value.layout.dim) if len(value.layout.dim) == 2 else data[None]
         if table.shape[1] > MAX_FIELDS:
             raise ValueError(f'it has {table.shape[1]} channels; {MAX_FIELDS} are allowed')
         return {f'data.{number}': table[:, number] for number in range(table.shape[1])}
@@ -631,12 +894,12 @@ def _rows_of(value: Any, msgtype: str) -> Rows:
 def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:
     """Yield the one frame of a bag: the topics that the mapping names, each with its time.
 
-    Times are those of the headers, or of logging where there are none, from the first message of the bag on.
+    Times are those of the headers, or of logging where there are none, from the first message of the bag on. The clocks
+    of devices that are another one than that of the recorder are put right by it.
     """
     columns_of_streams = [column for stream in mapping.streams.values() for column in stream.columns]
     wanted = {*columns_of_streams, *mapping.numbers(), *mapping.texts()}
     topics: dict[str, _Topic] = {}
-    first_ns = -1
     seen: dict[str, Any] = {}
 
     def chosen(connection: Any) -> bool:
@@ -646,13 +909,18 @@ def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
     for message in read_foreign(path, chosen):
         if message.topic not in topics:
             topics[message.topic] = _Topic(message.topic, seen[message.topic], place)
-        stamp_ns = topics[message.topic].add(message, take)
-        first_ns = stamp_ns if first_ns < 0 else first_ns
+        topics[message.topic].add(message, take)
+    _agree_on_clock(topics.values())
+    first_ns = next((topic.first_ns for topic in topics.values()), 0)
     columns: dict[str, AnyArray] = {}
     clocks: dict[str, str] = {}
     for name, topic in topics.items():
         clock = f'{name}/{TIME}'
         columns[clock] = topic.time_s(first_ns)
+        if f'{name}/{FRAME}' in wanted:
+            columns[f'{name}/{FRAME}'], clocks[f'{name}/{FRAME}'] = topic.frame_ids(), clock
+        else:
+            topic.refuse_frames()
         for part, array in topic.columns().items():
             columns[f'{name}/{part}'] = array
             clocks[f'{name}/{part}'] = clock
@@ -662,6 +930,25 @@ def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
             f"{', '.join(sorted(seen)) or 'none'}; write columns as topic and field, such as '/wrench/wrench.force.x'"
         )
     yield TableFrame(place, tuple(columns), partial(columns_of, columns, place), clocks=clocks)
+
+
+OTHER_CLOCK_NS = NANOSECONDS  # stamps that differ more from the time of logging are of another clock
+
+
+def _agree_on_clock(topics: Iterable[_Topic]) -> None:
+    """Put right the clocks of devices by the times of logging where topics have unlike ones."""
+    ahead = {topic: topic.ahead_ns() for topic in topics}
+    usual = [usual_ns for usual_ns, _ in ahead.values()]
+    if not usual or max(usual) - min(usual) <= OTHER_CLOCK_NS:
+        return
+    for topic, (usual_ns, change_ns) in ahead.items():
+        if change_ns > OTHER_CLOCK_NS:
+            raise InvalidData(
+                f'{topic.where}: the stamps differ from the times of logging, which other topics have, by '
+                f'{usual_ns / NANOSECONDS:.4g} s, and that changes by {change_ns / NANOSECONDS:.3g} s; record topics '
+                'with stamps of one clock'
+            )
+        topic.shift(-usual_ns)
 
 
 class _Topic:
@@ -674,18 +961,40 @@ class _Topic:
                 f"'{place}': the messages of '{name}' are {self._msgtype}, whose definition is neither in the bag nor "
                 'of ROS 2 itself; record it as MCAP, which stores definitions, or republish it as a standard message'
             )
+        self.where = f"'{place}', topic '{name}'"
         self._rows: list[Rows] = []
         self._stamps_ns: list[int] = []
+        self._ahead_ns: list[int] = []  # of the time of logging
         self._counts: list[int] = []
+        self._frames: list[str] = []
 
-    def add(self, message: RawMessage, take: Take) -> int:
-        """Add a message, and return its time."""
+    @property
+    def first_ns(self) -> int:
+        """Time of the first message."""
+        return self._stamps_ns[0]
+
+    def ahead_ns(self) -> tuple[int, int]:
+        """Return by how much stamps are ahead of logging, and by how much that changes."""
+        low, usual, high = np.percentile(self._ahead_ns, (5, 50, 95)).tolist()
+        return round(usual), round(high - low)
+
+    def shift(self, by_ns: int) -> None:
+        """Bring all times forward."""
+        self._stamps_ns = [stamp_ns + by_ns for stamp_ns in self._stamps_ns]
+
+    def add(self, message: RawMessage, take: Take) -> None:
+        """Add a message."""
         where = f"'{self._place}': message {len(self._rows)} of '{self._name}'"
         try:
             value = self._types.deserialize_cdr(message.data, self._msgtype)
             rows = _rows_of(value, self._msgtype)
+        except InvalidData as error:
+            raise InvalidData(f'{where}: {error}') from error
         except BROKEN as error:
             raise InvalidData(f'{where} is damaged: {error}; record it again') from error
+        audio = self._msgtype.startswith('audio_common_msgs/msg/AudioData') and len(self._rows) == MP3_MESSAGES
+        if audio and all(round(32768 * one['data'][0]) in MP3 for one in self._rows if len(one['data'])):
+            raise InvalidData(f'{where}: it is MP3 and no plain sound; republish it decoded, in the format wave')
         if self._rows and rows.keys() != self._rows[0].keys():
             other = ', '.join(sorted(rows.keys() ^ self._rows[0].keys())[:5])
             raise InvalidData(f'{where} has other fields than the first: {other}')
@@ -695,7 +1004,21 @@ class _Topic:
         stamp = getattr(getattr(value, 'header', None), 'stamp', None)
         stamped_ns = stamp.sec * NANOSECONDS + stamp.nanosec if stamp else 0
         self._stamps_ns.append(stamped_ns or message.log_ns)
-        return self._stamps_ns[-1]
+        self._ahead_ns.append(self._stamps_ns[-1] - message.log_ns)
+        self._frames.append(getattr(getattr(value, 'header', None), 'frame_id', ''))
+
+    def frame_ids(self) -> AnyArray:
+        """Return the frame of each row."""
+        return np.repeat(np.array(self._frames), self._counts)
+
+    def refuse_frames(self) -> None:
+        """Refuse messages of several frames, which are of several sensors."""
+        frames = sorted({*self._frames})
+        if len(frames) > 1:
+            raise InvalidData(
+                f'{self.where}: its messages have the frames {", ".join(frames[:4])}, so several sensors may publish '
+                f"there; choose one by rows: {{'{self._name}/{FRAME}': '{frames[0]}'}}"
+            )
 
     def columns(self) -> dict[str, AnyArray]:
         """Return all columns, (n,) each."""

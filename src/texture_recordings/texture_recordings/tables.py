@@ -8,6 +8,7 @@ import fnmatch
 import math
 import re
 import shutil
+import unicodedata
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
@@ -36,6 +37,7 @@ from texture_recordings.bags import DELAY_NS, PAUSE_NS, START_NS, BagWriter, is_
 from texture_recordings.clock import (
     MAX_LEFT_OUT,
     RESET_ROWS,
+    SAME_RATE,
     TIMES,
     ClockFault,
     burst_step_s,
@@ -58,10 +60,11 @@ from texture_recordings.readers import EXAMPLES, MAPPED, OTHER_KINDS, Columns, T
 PLAUSIBLE_HZ, LIKELY_HZ = (5.0, 200_000.0), (20.0, 20_000.0)
 LONGEST_SLIDE_S = 1800.0
 STATE_S = 0.1  # a state so often where a condition changes along a slide
-SAME_RATE = 1.05  # files of one stream may differ by this factor
 SAME_TIME_S = 1e-9
 WIDE = 100  # columns name_1 … name_n beyond this are hardly channels
 MAX_SLIDES = 20_000  # of one file
+COPIED_ROWS = 3
+MAX_ALTERNATING = 6  # sensors of which one row each follows the other
 # Lowest and highest mean of a slide that a tactile finger reaches, in SI units.
 PLAUSIBLE: Mapping[str, tuple[float, float]] = {
     'speed': (5e-5, 2.0), 'force': (1e-3, 100.0), 'direction': (-6.3, 6.3),
@@ -82,12 +85,24 @@ class ImportReport:
     conditions: dict[tuple[str, str], list[float]] = field(default_factory=lambda: defaultdict(list))
     left_out: Counter[str] = field(default_factory=Counter)  # by reason
     examples: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
+    named: set[str] = field(default_factory=set)  # surfaces that the mapping names
 
     def leave_out(self, reason: str, count: int, *examples: str) -> None:
         """Count what is left out, with the first places."""
         if count:
             self.left_out[reason] += count
             self.examples[reason] += examples[: EXAMPLES - len(self.examples[reason])]
+
+    def refuse_like_labels(self) -> None:
+        """Refuse labels that differ in nothing that a person would tell apart, and that `names` does not name."""
+        like: dict[str, str] = {}
+        for label in sorted(self.slides):
+            other = like.setdefault(_plain(label), label)
+            if other != label and not {label, other} <= self.named:
+                raise InvalidData(
+                    f"the labels '{other}' and '{label}' differ only in case, blanks, signs or digits behind the "
+                    f"point; write both under `label`, such as names: {{'{other}': '{label}', '{label}': '{label}'}}"
+                )
 
     def lines(self) -> list[str]:
         """Return the table that a person checks, and below it what was left out and why."""
@@ -110,6 +125,12 @@ class ImportReport:
         for reason, count in self.left_out.items():
             lines += [f'  {count} {reason}', *(f'    {example}' for example in self.examples[reason])]
         return lines
+
+
+def _plain(label: str) -> str:
+    """Return a label as a person reads it: without case, kinds of blanks, signs between words and zeros."""
+    text = re.sub(r'[\s_-]+', ' ', unicodedata.normalize('NFKC', label).casefold()).strip()
+    return f'{float(text):g}' if re.fullmatch(r'\d{1,15}(\.\d*)?', text) else text
 
 
 def _range(values: Sequence[float]) -> str:
@@ -138,6 +159,7 @@ def import_tables(
                 cut = is_cut_off(path)
                 report.leave_out('bags were cut off, and end with their last whole part', int(cut), f"'{place}'; see "
                                  'mcap recover')  # fmt: skip
+        report.refuse_like_labels()
         if not report.slides:
             short = report.left_out['slides are too short']
             raise InvalidData(
@@ -157,7 +179,9 @@ def _files(
     paths = [source]
     if source.is_dir() and not is_bag(source):
         found = sorted(source.glob('/'.join('*' * (mapping.files.count('/') + 1))))
-        paths = [path for path in found if is_bag(path) or not path.is_dir()]
+        paths = [
+            path for path in found if is_bag(path) or not path.is_dir() or _is_no_folder(path, source, mapping, kinds)
+        ]
     for path in paths:
         place = path.name if path == source else path.relative_to(source).as_posix()
         fields = template_fields(mapping.files, place)
@@ -171,6 +195,21 @@ def _files(
             f"no file in '{source}' has the form '{mapping.files}' and one of the endings {', '.join(kinds)}; "
             'give the folder that holds them, or correct `files` in the mapping'
         )
+
+
+def _is_no_folder(path: Path, source: Path, mapping: TableMapping, kinds: Sequence[str]) -> bool:
+    """Refuse a folder that is named as a file, or a bag that cannot be read; False for another folder."""
+    place = path.relative_to(source).as_posix()
+    parts = [one.name for one in path.iterdir() if one.suffix in ('.mcap', '.db3')]
+    if template_fields(mapping.files, place) is None:
+        return False
+    if 'bag' in kinds and parts:
+        raise InvalidData(
+            f"'{place}' holds {', '.join(sorted(parts)[:3])} without metadata.yaml; write it anew: ros2 bag reindex"
+        )
+    if path.suffix.lower() in kinds:
+        raise InvalidData(f"'{place}' is a folder and no file; move it elsewhere, or correct `files` in the mapping")
+    return False
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,6 +256,10 @@ class FrameSlides:
         self._reference = max(same or streams[:1], key=lambda one: len(one.rows))
         self._spans = self._cut()
         self._streams = [self._rated(one) for one in streams]
+        self._check_shared_rows()
+        self._refuse_alternating()
+        if frame.trials > 1 and mapping.slides.by != 'column' and not self._timed():
+            raise InvalidData(f"'{self._place}' has {frame.trials} trials; write slides: {{by: column, column: trial}}")
         self._reference = next(one for one in self._streams if one.name == self._reference.name)
 
     def slides(self) -> Iterator[tuple[str, ExplorationState, SlideStreams, Conditions]]:
@@ -273,6 +316,36 @@ class FrameSlides:
             )  # fmt: skip
         return read
 
+    def _refuse_alternating(self) -> None:
+        """Refuse rows of which an unused column, as the name of a sensor, has the same few values again and again."""
+        peek, used = self._frame.peek, {*self._columns.numbers, *self._columns.texts}
+        for name in [one for one in self._frame.names if one not in used][:40] if peek else ():
+            texts = peek(name) if peek else ()
+            values, codes = np.unique(texts, return_inverse=True)
+            count = len(values)
+            if 2 <= count <= MAX_ALTERNATING and len(texts) >= 10 * count and (codes[count:] == codes[:-count]).all():
+                raise InvalidData(
+                    f"'{self._place}': the rows have one value of '{name}' after the other ({', '.join(values)}), so "
+                    f"the signals of several sensors may alternate; choose one by rows: {{{name}: '{values[0]}'}}, or "
+                    f"all of one signal by rows: {{{name}: '*'}}"
+                )
+
+    def _timed(self) -> bool:
+        return all(one.time_s is not None for one in self._streams)
+
+    def _check_shared_rows(self) -> None:
+        """Refuse stated rates that contradict the rows which two streams without times share."""
+        rates: dict[tuple[str, int], dict[str, float]] = {}
+        for one in self._streams:
+            if one.time_s is None and len(one.rows) > 1:
+                rates.setdefault(one.group, {})[one.name] = one.rate_hz / float(np.median(np.diff(one.rows)))
+        for found in rates.values():
+            if max(found.values()) > SAME_RATE * min(found.values()):
+                told = ', '.join(f"{rate_hz:.4g} by '{name}'" for name, rate_hz in found.items())
+                raise InvalidData(
+                    f"'{self._place}': rows per second are {told}, which share their rows; correct `rate_hz`"
+                )
+
     def _line(self, row: int) -> int:
         lines = self._columns.lines
         return int(row) if lines is None or row >= len(lines) else int(lines[row])
@@ -315,6 +388,9 @@ class FrameSlides:
                 found |= np.isnan(self._columns.numbers[column]) & ~blank
             if (time := self._mapping.streams[name].time.column) and len(self._columns.numbers[time]) == len(found):
                 found |= np.isnan(self._columns.numbers[time])
+        outside = [f"'{self._place}', row {line}" for line in self._columns.outside]
+        self._report.rows += len(outside)
+        self._report.leave_out('rows above or below the samples', len(outside), *outside)
         for length, marked in bad.items():
             junk = self._columns.junk
             found = marked | junk if junk is not None and length == len(junk) else marked
@@ -353,6 +429,7 @@ class FrameSlides:
                 samples[:, place] = self._columns.numbers[column] * params.scale
         if np.isinf(samples).any():
             raise InvalidData(f"'{self._place}': '{name}' has values above 3.4e38; look at the columns and at `scale`")
+        self._check_groups(name, params, names, samples)
         kept, time_s = ~self._blank(name), None
         column = params.time.column or self._frame.clocks.get(names[0], '')
         if column:
@@ -383,6 +460,32 @@ class FrameSlides:
                 'format: {transpose: true} if the array lies on its side'
             )
 
+    def _check_groups(self, name: str, params: StreamColumns, names: Sequence[str], samples: AnyArray) -> None:
+        """Refuse columns that are no consecutive samples although the mapping says so, or that seem to be some."""
+        parts = [re.fullmatch(r'(.*?)(\d{1,9})', one) for one in names]
+        if not all(parts):
+            return
+        stems, numbers = [one[1] for one in parts if one], np.array([int(one[2]) for one in parts if one])
+        count = params.samples_per_row
+        if count > 1:
+            groups = [slice(first, first + count) for first in range(0, len(names), count)]
+            if any(len({*stems[one]}) > 1 or (np.diff(numbers[one]) != 1).any() for one in groups):
+                raise InvalidData(
+                    f"'{self._place}': the columns of '{name}' are {', '.join(names[:4])} …, whose numbers do not "
+                    f'count up within {count} columns; write them in the order of the samples, such as a range '
+                    f"'{stems[0]}{numbers.min()}-{numbers.max()}'"
+                )
+        elif not count and len(names) > 3 and len({*stems}) == 1 and (np.diff(numbers) == 1).all() and len(samples) > 9:
+            # The last sample of a row is then as near to the first of the next one as neighbours in a row are.
+            next_row = np.abs(samples[1:, 0] - samples[:-1, -1])
+            within, between = np.abs(np.diff(samples, axis=1)), np.abs(np.diff(samples, axis=0))
+            near, far = np.nanmedian(within), np.nanmedian(between)
+            if near > 0 and np.nanmedian(next_row) < 2.0 * near and far > 3.0 * near:
+                raise InvalidData(
+                    f"'{self._place}': the columns {names[0]} … {names[-1]} go on from row to row as consecutive "
+                    f'samples of one channel; write samples_per_row: {len(names)} if they are, 1 if they are channels'
+                )
+
     def _cut(self) -> list[slice]:
         """Return the rows of the reference in each slide."""
         params, reference = self._mapping.slides, self._reference
@@ -400,6 +503,7 @@ class FrameSlides:
             )
             reset = (ahead < times[:-1, None]).all(axis=1)
             changes = np.flatnonzero((np.diff(times) >= params.pause_s) | reset) + 1
+            self._refuse_copies(reference, times, np.flatnonzero(reset) + 1)
         elif params.by == 'time':
             if times is not None and (np.diff(times) < 0).any():
                 row = int(np.argmax(np.diff(times) < 0)) + 1
@@ -425,6 +529,20 @@ class FrameSlides:
             )
         return found
 
+    def _refuse_copies(self, stream: Stream, times: Array, starts: AnyArray) -> None:
+        """Refuse runs that begin with the last rows of the one before, as logs do that were joined."""
+        for begin, start in pairwise([0, *starts.tolist()]):
+            row = begin + int(np.searchsorted(times[begin:start], times[start]))
+            count = min(start - row, COPIED_ROWS)
+            if count == COPIED_ROWS and all(
+                np.array_equal(array[row : row + count], array[start : start + count], equal_nan=True)
+                for array in (times, stream.samples)
+            ):
+                raise InvalidData(self._fault(
+                    stream, start, f'the rows from here on are those from row {self._line(stream.rows[row])} on, with '
+                    'the same times and values; save each row once',
+                ))  # fmt: skip
+
     def _rated(self, stream: Stream) -> Stream:
         """Return a stream with the rate of its rows: as stated, else by its times, which must agree."""
         name, params, per_row = stream.name, stream.params, stream.per_row
@@ -442,6 +560,11 @@ class FrameSlides:
             parts = [part for part in parts if len(part) > 1] or [stream.time_s]
             burst_s = burst_step_s(np.concatenate([np.diff(part) for part in parts]))
             measured = per_row * estimated_rate_hz(parts, burst_s)
+            if not measured > 0:
+                raise InvalidData(
+                    f"'{self._place}': the times of '{name}' do not grow from row to row; give a column of time that "
+                    'grows and has enough digits, or `rate_hz` in its place'
+                )
             self._refuse_mixed(stream, parts, burst_s)
         # Of the first file: windows of all are to have as many samples.
         rate_hz = self._report.rates_hz.get(name) or params.rate_hz or measured
@@ -524,7 +647,7 @@ class FrameSlides:
     def _slide(self, times: Array, rows: slice, number: int) -> tuple[str, ExplorationState, SlideStreams, Conditions]:
         label, reference = self._mapping.label, self._reference
         code = label.value or self._value(label.column, rows, 'label')
-        surface = checked_label(label.names.get(code, code))
+        surface = checked_label(self._named(code))
         if not surface:
             raise InvalidData(f"'{self._place}': a slide has an empty label; name another column under `label`")
         session = self._value(self._mapping.session, rows, 'session') if self._mapping.session else surface
@@ -544,6 +667,21 @@ class FrameSlides:
         self._report.slides[surface] += 1
         named = ExplorationState(0, f'{self._place}/{number}', self._mapping.motion, Phase.SLIDE, surface=surface)
         return session, named, streams, conditions
+
+    def _named(self, code: str) -> str:
+        """Return the name of a label, by number where codes are numbers: 1 names '1.0' and '01', too."""
+        names = self._mapping.label.names
+        number = _number(code)
+        same = [code] if code in names else [one for one in names if _number(one) == number]
+        if same:
+            self._report.named.add(names[same[0]])
+            return names[same[0]]
+        if names and math.isfinite(number) and all(math.isfinite(_number(one)) for one in names):
+            raise InvalidData(
+                f"'{self._place}': the label {code} has no name; it is none of {', '.join(names)} under `names`; add "
+                'it, or leave its rows out by `values` under `slides`'
+            )
+        return code
 
     def _samples(
         self, stream: Stream, surface: str, group_rows: tuple[int, int], begin_s: float, end_s: float
@@ -645,6 +783,13 @@ class FrameSlides:
         times, values = times[np.isfinite(values)], values[np.isfinite(values)] * factor
         negative = name != 'direction' and len(values) and values.mean() < 0
         return times, -values if negative else values
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
 
 
 def _slides_at(value: str, wanted: Sequence[str]) -> bool:
