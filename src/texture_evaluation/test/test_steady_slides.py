@@ -201,7 +201,7 @@ def test_wrong_sources_names_and_numbers_are_refused_with_a_sentence(tmp_path: P
     ):
         with pytest.raises(UnknownName, match='did you mean'):
             importer(source, tmp_path / 'out', materials=[name])
-        with pytest.raises(InvalidData, match='none of the slides'):
+        with pytest.raises(InvalidData, match='none of the requested slides'):
             importer(source, tmp_path / 'out', slides='500')
         with pytest.raises(InvalidData, match='give the folder'):
             importer(tmp_path, tmp_path / 'out')

@@ -139,5 +139,5 @@ def test_a_wrong_source_material_or_slide_is_refused_with_a_sentence(tmp_path: P
         import_biotac20(tmp_path / 'broken', tmp_path / 'out')
     with pytest.raises(UnknownName, match="did you mean 'material07'"):
         import_biotac20(source, tmp_path / 'out', materials=['material70'])
-    with pytest.raises(InvalidData, match='none of the slides'):
+    with pytest.raises(InvalidData, match='none of the requested slides'):
         import_biotac20(source, tmp_path / 'out', slides='50')
