@@ -152,7 +152,7 @@ def test_a_node_that_dies_is_named_with_its_code_and_the_others_go_on(launch) ->
 def test_the_death_of_a_needed_node_stops_the_others(launch) -> None:
     launched = launch({'good': GOOD, 'bad': 'echo no disk; exit 3'}, bad='on_exit="shutdown"')
     assert launched.end() == 1
-    assert any('bad is needed' in line for line in launched.lines)
+    assert any('bad is required' in line for line in launched.lines)
     assert launched.lines[-1] == '[launch] the launch ended because bad died with exit code 3: no disk'
 
 
@@ -196,7 +196,7 @@ def test_a_node_that_was_started_wrongly_is_not_restarted_and_stops_the_others(l
     launched = launch({'good': GOOD, 'wrong': 'echo why; exit 2'}, wrong='respawn="true"')
     assert launched.end() == 1
     assert launched.lines.count('[wrong] why') == 1
-    assert any('wrong is needed' in line for line in launched.lines)
+    assert any('wrong is required' in line for line in launched.lines)
 
 
 def test_together_the_death_of_any_node_stops_all_and_none_is_restarted(launch) -> None:

@@ -72,7 +72,7 @@ def test_an_explorer_that_was_started_again_is_not_waited_for(monkeypatch):
         operator.wait_for_explorer(30.0)
         second = threading.Timer(1.0, lambda: later.enter_context(silent_explorer()))
         second.start()
-        with pytest.raises(MotionAborted, match='started again'):
+        with pytest.raises(MotionAborted, match='was restarted'):
             operator.explore(ExplorationRequest('linear_slide'))
         second.join()
 
@@ -85,15 +85,17 @@ def test_an_explorer_that_does_not_keep_the_timeout_is_left(monkeypatch):
             operator.explore(ExplorationRequest('linear_slide', timeout_s=0.2))
 
 
-def test_ctrl_c_says_that_the_robot_must_be_looked_at_when_the_explorer_does_not_confirm_the_end(monkeypatch):
+@pytest.mark.parametrize('accepted', [False, True])
+def test_ctrl_c_says_that_the_robot_must_be_looked_at_when_the_explorer_does_not_confirm_the_end(monkeypatch, accepted):
     monkeypatch.setattr(operators, 'CANCEL_DEADLINE_S', 0.5)
-    taken = threading.Event()
+    taken, sent = threading.Event(), []
 
     def press_ctrl_c():
-        if taken.is_set():
+        if taken.is_set() or (sent and not accepted):
             raise KeyboardInterrupt
 
     with silent_explorer(taken), operators.Operator(domain_id=DOMAIN, guard=press_ctrl_c) as operator:
         operator.wait_for_explorer(30.0)
+        sent.append(True)
         with pytest.raises(KeyboardInterrupt, match=r'has not confirmed within 0\.5 s that the finger was lifted'):
             operator.explore(ExplorationRequest('linear_slide'))

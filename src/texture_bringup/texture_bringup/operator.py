@@ -144,6 +144,10 @@ def note_diagnostics(node: Node, feed: Feed, message: DiagnosticArray) -> None:
 STEP_S = 0.1
 LEVEL_NAMES = {value: name for name, value in LEVELS.items()}
 CANCEL_DEADLINE_S = 10.0
+UNCONFIRMED = (
+    'the explorer has not confirmed within {:g} s that the finger was lifted; look at the robot, and use its emergency '
+    'stop if it moves'
+)
 LISTENERS_DEADLINE_S = 60.0
 FEATURES_DEADLINE_S = 30.0
 # An explorer that explores sends feedback, and else its idle state once a second: silent for this long, it has ended or
@@ -262,7 +266,14 @@ class Operator:
 
         accepted = self._explore.send_goal_async(action.Explore.Goal(request=to_msg(request)), on_feedback)
         silent = 'the explorer accepts no request; stop it, and check that no second one runs'
-        self._until(accepted.done, ACCEPT_S, silent, MotionAborted)
+        try:
+            self._until(accepted.done, ACCEPT_S, silent, MotionAborted)
+        except KeyboardInterrupt:  # the explorer may have the request already
+            self._executor.spin_until_future_complete(accepted, CANCEL_DEADLINE_S)
+            goal = accepted.result()
+            raise KeyboardInterrupt(
+                self._cancel(goal, goal.get_result_async()) if goal else UNCONFIRMED.format(CANCEL_DEADLINE_S)
+            ) from None
         goal = accepted.result()
         endings = [goal.get_result_async()]
         deadline_s = time.monotonic() + (request.timeout_s + CANCEL_DEADLINE_S if request.timeout_s else math.inf)
@@ -482,8 +493,5 @@ class Operator:
         while not ending.done() and time.monotonic() < deadline:
             self._executor.spin_once(timeout_sec=STEP_S)
         if not ending.done():
-            return (
-                f'the explorer has not confirmed within {CANCEL_DEADLINE_S:g} s that the finger was lifted; look at '
-                'the robot, and use its emergency stop if it moves'
-            )
+            return UNCONFIRMED.format(CANCEL_DEADLINE_S)
         return f'the exploration has ended: {ending.result().result.result.message}'

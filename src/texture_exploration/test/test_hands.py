@@ -189,15 +189,15 @@ def test_a_goal_that_a_motor_refuses_is_a_named_fault(bus, hand):
     hand.connect()
     bus.motors.tables[1][38:40] = (50).to_bytes(2, 'little')  # lowered behind the program's back
     hand.grip({'index': 1.0})
-    until(lambda: "motor 1 ('press' of index) did not take 'goal_current'" in fault_of(hand))
+    until(lambda: "motor 1 ('press' of index) did not accept 'goal_current'" in fault_of(hand))
     assert 'exceeds the limit' in fault_of(hand)
     until(lambda: torque_is_off(bus))
 
 
 REFUSED = [
     ('xm430', {'models': [1020, 1010]}, r'model 1010 \(XH430-W210\) makes 1\.92 N·m/A at 1\.34 mA per count'),
-    ('leap', {'table': {'bus_watchdog': [100, 1]}}, "'bus_watchdog' stands at .* the protection would not be armed"),
-    ('leap', {'table': {'goal_current': [104, 2]}}, "'goal_current' stands at .* the protection would not be armed"),
+    ('leap', {'table': {'bus_watchdog': [100, 1]}}, "'bus_watchdog' is at .* the protection would not be armed"),
+    ('leap', {'table': {'goal_current': [104, 2]}}, "'goal_current' is at .* the protection would not be armed"),
     *[
         ('leap', {'fingers': {'thumb': {'press': {'id': 13, 'lever_m': lever_m}}}}, r'lever_m is .* 0\.001 to 0\.3')
         for lever_m in (-1.0, 0.0, 0.5)

@@ -75,7 +75,7 @@ def test_the_serial_number_is_reported_and_a_silent_bridge_is_an_error_with_advi
     rig.signal_s(1.5)
     assert rig.sensor.details['serial of finger 0'] == 'BT-0'
     rig.set(silent=True)
-    assert 'sends no whole frames' in rig.fault()
+    assert 'sends no complete frames' in rig.fault()
 
 
 def test_all_fingers_of_a_board_have_separate_topics(open_rig: Make) -> None:
