@@ -144,10 +144,6 @@ def note_diagnostics(node: Node, feed: Feed, message: DiagnosticArray) -> None:
 STEP_S = 0.1
 LEVEL_NAMES = {value: name for name, value in LEVELS.items()}
 CANCEL_DEADLINE_S = 10.0
-UNCONFIRMED = (
-    'the explorer has not confirmed within {:g} s that the finger was lifted; look at the robot, and use its emergency '
-    'stop if it moves'
-)
 LISTENERS_DEADLINE_S = 60.0
 FEATURES_DEADLINE_S = 30.0
 # An explorer that explores sends feedback, and else its idle state once a second: silent for this long, it has ended or
@@ -189,6 +185,14 @@ class ExplorationResult:
     def success(self) -> bool:
         """Whether the motion was completed."""
         return self.error is ExplorationError.NONE
+
+
+def _unconfirmed() -> str:
+    """Return what an operator must know whose stop was not answered."""
+    return (
+        f'the explorer has not confirmed within {CANCEL_DEADLINE_S:g} s that the finger was lifted; look at the robot, '
+        'and use its emergency stop if it moves'
+    )
 
 
 class Operator:
@@ -271,9 +275,7 @@ class Operator:
         except KeyboardInterrupt:  # the explorer may have the request already
             self._executor.spin_until_future_complete(accepted, CANCEL_DEADLINE_S)
             goal = accepted.result()
-            raise KeyboardInterrupt(
-                self._cancel(goal, goal.get_result_async()) if goal else UNCONFIRMED.format(CANCEL_DEADLINE_S)
-            ) from None
+            raise KeyboardInterrupt(self._cancel(goal, goal.get_result_async()) if goal else _unconfirmed()) from None
         goal = accepted.result()
         endings = [goal.get_result_async()]
         deadline_s = time.monotonic() + (request.timeout_s + CANCEL_DEADLINE_S if request.timeout_s else math.inf)
@@ -493,5 +495,5 @@ class Operator:
         while not ending.done() and time.monotonic() < deadline:
             self._executor.spin_once(timeout_sec=STEP_S)
         if not ending.done():
-            return UNCONFIRMED.format(CANCEL_DEADLINE_S)
+            return _unconfirmed()
         return f'the exploration has ended: {ending.result().result.result.message}'
