@@ -113,6 +113,10 @@ LABELS: dict[str, tuple[Write, dict, Truth]] = {
     'codes 0.0 and 1.0': (coded(['0.0'] * 300 + ['1.0'] * 300), CODES, HALVES),
     'codes of savetxt': (coded(['0.000e+00'] * 300 + ['1.000e+00'] * 300), CODES, HALVES),
     'a code without a name': (coded(np.repeat([1, 2], 300)), CODES, 'the label 2 has no name; it is none of 0, 1'),
+    'a code with an underscore': (
+        coded(['1_0'] * 300 + ['10'] * 300),
+        {**CODES, 'label': {'column': 'l', 'names': {10: 'felt'}}}, [('1_0', X[:300]), ('felt', X[300:])],
+    ),
     'nan outside slides': (coded(['nan'] * 100 + ['0'] * 500), CODES, [('cork', X[100:])]),
     'floats with NaN': (
         npz(t=T, x=X, l=np.r_[np.full(100, np.nan), np.zeros(200), np.ones(300)]), {**CODES, **ANY},

@@ -67,7 +67,7 @@ class TableFrame:
     fields: Mapping[str, str] = field(default_factory=dict)
     rate_hz: float = 0.0
     clocks: Mapping[str, str] = field(default_factory=dict)  # column → column of its times, s
-    peek: Callable[[str], AnyArray] | None = None  # the first texts of a column
+    peek: Callable[[Sequence[str]], Mapping[str, AnyArray]] | None = None  # the first texts of columns
     trials: int = 0  # of arrays (n_trials, n_samples, n_channels)
 
     def chosen(self, wanted: Sequence[str]) -> list[str]:
@@ -170,17 +170,17 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
         )
     timed = all(stream.time.column for stream in mapping.streams.values())
 
-    def peek(name: str) -> AnyArray:
+    def peek(wanted: Sequence[str]) -> Mapping[str, AnyArray]:
         with _lines(path, form) as lines:
             rows = [_row(_cells(line, form.delimiter), len(names)) for _, line in islice(lines, 1, PEEK_ROWS)]
-        return np.array([row[names.index(name)] for row in rows if row])
+        return {name: np.array([row[names.index(name)] for row in rows if row]) for name in wanted}
 
     yield TableFrame(place, names, partial(_csv_columns, path, place, form, names, take, timed), peek=peek)
 
 
 def _are_samples(names: Sequence[str]) -> bool:
     """Return whether the names of columns are numbers, and not such that count up."""
-    values = np.array([_number(name) for name in names])
+    values = np.array([number_of(name) for name in names])
     plain = all(name.isdigit() for name in names) and (np.diff(values) == 1).all()
     return bool(np.isfinite(values).all()) and not plain
 
@@ -201,7 +201,7 @@ def _csv_columns(  # noqa: PLR0917 – bound one after the other
             take(len(block) * (len(numbers) + 2 * len(texts)))
             rows = [_row(_cells(line, form.delimiter), len(names)) for _, line in block]
             read: dict[str, AnyArray] = {'': np.array([number for number, _ in block])}
-            _refuse_other_names(rows, names, block, place, timed=timed)
+            _refuse_repeated_names(rows, names, block, place, timed=timed)
             if not blocks and form.delimiter == ',':
                 _refuse_split_decimals(rows, names, place)
             junk = np.array([row is None for row in rows])
@@ -220,7 +220,7 @@ def _csv_columns(  # noqa: PLR0917 – bound one after the other
                     junk[index] = True
                     if len(found) < 2 * EXAMPLES:
                         reason = f"column '{name}': '{cell[:40]}' is not a finite number"
-                        if form.decimal == '.' and math.isfinite(_number(cell.replace(',', '.'))):
+                        if form.decimal == '.' and math.isfinite(number_of(cell.replace(',', '.'))):
                             reason += "; if commas are decimal, write format: {decimal: ','}"
                         found.setdefault(block[index][0], reason)
             reasons |= dict(sorted(found.items())[: EXAMPLES - len(reasons)])
@@ -268,7 +268,7 @@ def _edges(
         return 0, count
 
     def is_number(cell: str) -> bool:
-        return math.isfinite(_number(cell.replace(decimal, '.')))
+        return math.isfinite(number_of(cell.replace(decimal, '.')))
 
     numeric = [at for at in range(len(whole[0])) if sum(is_number(row[at]) for row in whole) > 0.7 * len(whole)]
 
@@ -300,13 +300,13 @@ def _text(cell: str) -> str:
     return '' if cell.lower() in NO_TEXT else cell[:MAX_TEXT].replace('\0', '')
 
 
-def _refuse_other_names(
+def _refuse_repeated_names(
     rows: Sequence[list[str] | None], names: Sequence[str], block: Sequence[Line], place: str, *, timed: bool
 ) -> None:
     """Refuse a file of which a part has other columns, or of which parts follow each other without any time."""
     known = frozenset(names)
     for (line, _), row in zip(block, rows, strict=True):
-        if not row or known.isdisjoint(row) or any(math.isfinite(_number(cell)) for cell in row):
+        if not row or known.isdisjoint(row) or any(math.isfinite(number_of(cell)) for cell in row):
             continue
         again = [cell.lstrip('\ufeff') for cell in row]
         if again != list(names) and len(known.intersection(again)) > 0.3 * len(names):
@@ -403,14 +403,15 @@ def _parsed(rows: Sequence[list[str] | None], place: int, decimal: str) -> Array
     if decimal != '.':  # '1.234' may be a thousand
         cells = ['?' if '.' in cell else cell.replace(decimal, '.') for cell in cells]
     try:
-        values = np.array([math.nan if '_' in cell else float(cell) for cell in cells])  # Python reads '1_0' as 10
+        values = np.array([math.nan if '_' in cell else float(cell) for cell in cells])
     except ValueError:
-        values = np.array([_number(cell) for cell in cells])
+        values = np.array([number_of(cell) for cell in cells])
     values[~np.isfinite(values)] = np.nan
     return values
 
 
-def _number(cell: str) -> float:
+def number_of(cell: str) -> float:
+    """Return the number that a cell is, NaN if it is none; Python would read '1_0' as 10."""
     try:
         return math.nan if '_' in cell else float(cell)
     except ValueError:
@@ -510,7 +511,7 @@ def _unpacked_bytes(file: Any, place: str) -> int:
     for name, shape, kind in listed:
         if kind != 'sparse' and math.prod(shape) > max(MAX_VALUES, total):
             raise InvalidData(
-                f"'{place}' declares {math.prod(shape) / 1e6:.0f} million values of '{name}', and lacks them"
+                f"'{place}' declares {math.prod(shape) / 1e6:.0f} million values of '{name}', and does not contain them"
             )
     nested = any(kind in ('cell', 'struct', 'object') for _, _, kind in listed)
     if nested and arrays > MAX_ARRAYS:
@@ -586,7 +587,7 @@ def _read_hdf5(
             if matlab and member.attrs.get('MATLAB_class') == b'char':
                 return np.array(''.join(map(chr, np.asarray(member[()]).ravel().tolist())))
             if not texts:
-                array = _as_meant(member, np.asarray(member[()]))
+                array = _scaled(member, np.asarray(member[()]))
                 return array.T if matlab else array
             cells = member.asstr(errors='replace')
             if not member.shape:
@@ -599,7 +600,7 @@ def _read_hdf5(
 SCALED = {'scale_factor': 1.0, 'add_offset': 0.0}  # attributes by the CF conventions
 
 
-def _as_meant(member: Any, array: AnyArray) -> AnyArray:
+def _scaled(member: Any, array: AnyArray) -> AnyArray:
     """Return the values of a data set as its attributes scale them, NaN where none was ever written."""
     if array.dtype.kind not in 'iuf' or not array.size:
         return array
@@ -776,8 +777,8 @@ def _unfolded_columns(arrays: Mapping[str, AnyArray], place: str) -> tuple[dict[
     return columns, constants
 
 
-def _first_texts(columns: Mapping[str, AnyArray], name: str) -> AnyArray:
-    return _texts(columns[name][:PEEK_ROWS])
+def _first_texts(columns: Mapping[str, AnyArray], wanted: Sequence[str]) -> Mapping[str, AnyArray]:
+    return {name: _texts(columns[name][:PEEK_ROWS]) for name in wanted}
 
 
 def _parts(array: AnyArray, name: str) -> dict[str, AnyArray]:
@@ -854,7 +855,7 @@ MP3 = frozenset((0xFBFF - 2**16, 0xFAFF - 2**16, 0xF3FF - 2**16, 0xF2FF - 2**16)
 PLANE = frozenset(('height', 'width', 'row', 'rows', 'column', 'columns', 'col', 'cols', 'x', 'y'))
 
 
-def _in_time(data: AnyArray, axes: Sequence[Any]) -> AnyArray:
+def _by_samples(data: AnyArray, axes: Sequence[Any]) -> AnyArray:
     """Return an array of two dimensions as (n_samples, n_channels), as their labels name them."""
     first, second = (axis.label.strip().lower() for axis in axes)
     table: AnyArray = data.reshape([axis.size for axis in axes])
@@ -880,7 +881,7 @@ def _rows_of(value: Any, msgtype: str) -> Rows:
         }  # fmt: skip
     if msgtype in ('std_msgs/msg/Float32MultiArray', 'std_msgs/msg/Float64MultiArray'):
         data = value.data[value.layout.data_offset :]
-        table = _in_time(data, value.layout.dim) if len(value.layout.dim) == 2 else data[None]
+        table = _by_samples(data, value.layout.dim) if len(value.layout.dim) == 2 else data[None]
         if table.shape[1] > MAX_FIELDS:
             raise ValueError(f'it has {table.shape[1]} channels; {MAX_FIELDS} are allowed')
         return {f'data.{number}': table[:, number] for number in range(table.shape[1])}
@@ -894,8 +895,8 @@ def _rows_of(value: Any, msgtype: str) -> Rows:
 def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:
     """Yield the one frame of a bag: the topics that the mapping names, each with its time.
 
-    Times are those of the headers, or of logging where there are none, from the first message of the bag on. The clocks
-    of devices that are another one than that of the recorder are put right by it.
+    Times are those of the headers, or of logging where there are none, from the first message of the bag on. A device
+    clock that differs from that of the recorder is corrected by it.
     """
     columns_of_streams = [column for stream in mapping.streams.values() for column in stream.columns]
     wanted = {*columns_of_streams, *mapping.numbers(), *mapping.texts()}
@@ -936,7 +937,7 @@ OTHER_CLOCK_NS = NANOSECONDS  # stamps that differ more from the time of logging
 
 
 def _agree_on_clock(topics: Iterable[_Topic]) -> None:
-    """Put right the clocks of devices by the times of logging where topics have unlike ones."""
+    """Correct the clocks of devices by the times of logging where those of topics differ."""
     ahead = {topic: topic.ahead_ns() for topic in topics}
     usual = [usual_ns for usual_ns, _ in ahead.values()]
     if not usual or max(usual) - min(usual) <= OTHER_CLOCK_NS:

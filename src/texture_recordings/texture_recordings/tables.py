@@ -55,7 +55,7 @@ from texture_recordings.mapping import (
     TableMapping,
     template_fields,
 )
-from texture_recordings.readers import EXAMPLES, MAPPED, OTHER_KINDS, Columns, TableFrame, frames, kind_of
+from texture_recordings.readers import EXAMPLES, MAPPED, OTHER_KINDS, Columns, TableFrame, frames, kind_of, number_of
 
 PLAUSIBLE_HZ, LIKELY_HZ = (5.0, 200_000.0), (20.0, 20_000.0)
 LONGEST_SLIDE_S = 1800.0
@@ -65,6 +65,7 @@ WIDE = 100  # columns name_1 … name_n beyond this are hardly channels
 MAX_SLIDES = 20_000  # of one file
 COPIED_ROWS = 3
 MAX_ALTERNATING = 6  # sensors of which one row each follows the other
+MAX_PEEKED = 40  # columns in which they are looked for
 # Lowest and highest mean of a slide that a tactile finger reaches, in SI units.
 PLAUSIBLE: Mapping[str, tuple[float, float]] = {
     'speed': (5e-5, 2.0), 'force': (1e-3, 100.0), 'direction': (-6.3, 6.3),
@@ -179,9 +180,9 @@ def _files(
     paths = [source]
     if source.is_dir() and not is_bag(source):
         found = sorted(source.glob('/'.join('*' * (mapping.files.count('/') + 1))))
-        paths = [
-            path for path in found if is_bag(path) or not path.is_dir() or _is_no_folder(path, source, mapping, kinds)
-        ]
+        paths = [path for path in found if is_bag(path) or not path.is_dir()]
+        for folder in sorted({*found} - {*paths}):
+            _refuse_as_file(folder, source, mapping, kinds)
     for path in paths:
         place = path.name if path == source else path.relative_to(source).as_posix()
         fields = template_fields(mapping.files, place)
@@ -197,19 +198,18 @@ def _files(
         )
 
 
-def _is_no_folder(path: Path, source: Path, mapping: TableMapping, kinds: Sequence[str]) -> bool:
-    """Refuse a folder that is named as a file, or a bag that cannot be read; False for another folder."""
-    place = path.relative_to(source).as_posix()
-    parts = [one.name for one in path.iterdir() if one.suffix in ('.mcap', '.db3')]
+def _refuse_as_file(folder: Path, source: Path, mapping: TableMapping, kinds: Sequence[str]) -> None:
+    """Refuse a folder with the name of a file that is wanted, or with the parts of a bag that cannot be read."""
+    place = folder.relative_to(source).as_posix()
     if template_fields(mapping.files, place) is None:
-        return False
+        return
+    parts = sorted(one.name for one in folder.iterdir() if one.suffix in ('.mcap', '.db3'))
     if 'bag' in kinds and parts:
         raise InvalidData(
-            f"'{place}' holds {', '.join(sorted(parts)[:3])} without metadata.yaml; write it anew: ros2 bag reindex"
+            f"'{place}' holds {', '.join(parts[:3])} without metadata.yaml; write it anew: ros2 bag reindex"
         )
-    if path.suffix.lower() in kinds:
+    if folder.suffix.lower() in kinds:
         raise InvalidData(f"'{place}' is a folder and no file; move it elsewhere, or correct `files` in the mapping")
-    return False
 
 
 @dataclass(frozen=True, eq=False)
@@ -318,9 +318,9 @@ class FrameSlides:
 
     def _refuse_alternating(self) -> None:
         """Refuse rows of which an unused column, as the name of a sensor, has the same few values again and again."""
-        peek, used = self._frame.peek, {*self._columns.numbers, *self._columns.texts}
-        for name in [one for one in self._frame.names if one not in used][:40] if peek else ():
-            texts = peek(name) if peek else ()
+        used = {*self._columns.numbers, *self._columns.texts}
+        unused = [name for name in self._frame.names if name not in used][:MAX_PEEKED]
+        for name, texts in (self._frame.peek(unused) if self._frame.peek and unused else {}).items():
             values, codes = np.unique(texts, return_inverse=True)
             count = len(values)
             if 2 <= count <= MAX_ALTERNATING and len(texts) >= 10 * count and (codes[count:] == codes[:-count]).all():
@@ -341,9 +341,9 @@ class FrameSlides:
                 rates.setdefault(one.group, {})[one.name] = one.rate_hz / float(np.median(np.diff(one.rows)))
         for found in rates.values():
             if max(found.values()) > SAME_RATE * min(found.values()):
-                told = ', '.join(f"{rate_hz:.4g} by '{name}'" for name, rate_hz in found.items())
+                stated = ', '.join(f"{rate_hz:.4g} by '{name}'" for name, rate_hz in found.items())
                 raise InvalidData(
-                    f"'{self._place}': rows per second are {told}, which share their rows; correct `rate_hz`"
+                    f"'{self._place}': rows per second are {stated}, which share their rows; correct `rate_hz`"
                 )
 
     def _line(self, row: int) -> int:
@@ -671,12 +671,12 @@ class FrameSlides:
     def _named(self, code: str) -> str:
         """Return the name of a label, by number where codes are numbers: 1 names '1.0' and '01', too."""
         names = self._mapping.label.names
-        number = _number(code)
-        same = [code] if code in names else [one for one in names if _number(one) == number]
+        number = number_of(code)
+        same = [code] if code in names else [one for one in names if number_of(one) == number]
         if same:
             self._report.named.add(names[same[0]])
             return names[same[0]]
-        if names and math.isfinite(number) and all(math.isfinite(_number(one)) for one in names):
+        if names and math.isfinite(number) and all(math.isfinite(number_of(one)) for one in names):
             raise InvalidData(
                 f"'{self._place}': the label {code} has no name; it is none of {', '.join(names)} under `names`; add "
                 'it, or leave its rows out by `values` under `slides`'
@@ -783,13 +783,6 @@ class FrameSlides:
         times, values = times[np.isfinite(values)], values[np.isfinite(values)] * factor
         negative = name != 'direction' and len(values) and values.mean() < 0
         return times, -values if negative else values
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
 
 
 def _slides_at(value: str, wanted: Sequence[str]) -> bool:
