@@ -99,7 +99,7 @@ def test_what_is_trained_from_either_end_lies_in_no_test_of_another_stretch() ->
 def test_what_is_finished_is_not_computed_again_and_what_is_not_is_named(tmp_path: Path) -> None:
     options = BenchmarkOptions(tmp_path, quick=True, workers=1)
     cell = figures([ended('cork', 'cork', accepted=True, cluster='a')])
-    line = {'piece': f'simulated halves, {SVC}', 'cells': [[DISTANCE, '0', SVC, cell]]}
+    line = {'part': f'simulated halves, {SVC}', 'cells': [[DISTANCE, '0', SVC, cell]]}
     (tmp_path / generalisation.FINISHED).write_text(json.dumps(line) + '\n')
     result = generalisation.run(replace(options, budget_s=0.01))
     assert result.numbers['missing'] == ['simulated halves, default']

@@ -132,24 +132,24 @@ def run(options: BenchmarkOptions, readers: Readers | None = None) -> BenchmarkR
     """
     sets = REDUCED if options.quick else SETS
     slides = _read_all(list(dict.fromkeys(one.data for one in sets.values())), options, readers or READERS)
-    chunks = [(name, recipe) for name, one in sets.items() for recipe in one.recipes if one.data in slides]
+    parts = [(name, recipe) for name, one in sets.items() for recipe in one.recipes if one.data in slides]
     if not peers.available(peers.CNN):
-        chunks = [chunk for chunk in chunks if chunk[1] != peers.CNN]
+        parts = [part for part in parts if part[1] != peers.CNN]
     # What was finished before, in the same folder, is not computed again.
     path = options.out / FINISHED
     options.out.mkdir(parents=True, exist_ok=True)
     found = _finished(path)
     if found:
         print(f"{len(found)} parts are of an earlier run, from '{path}'; remove it to compute all again", flush=True)
-    left = [chunk for chunk in chunks if ', '.join(chunk) not in found]
-    left.sort(key=lambda chunk: (chunk[1] == peers.CNN, chunk[1] not in SLOW))
-    work = partial(_piece, slides, options.seed)
+    left = [part for part in parts if ', '.join(part) not in found]
+    left.sort(key=lambda part: (part[1] == peers.CNN, part[1] not in SLOW))
+    work = partial(_run_part, slides, options.seed)
     with path.open('a', encoding='utf-8') as file:
-        for chunk, cells in finished_forked(work, left, options.workers, options.budget_s):
-            found[', '.join(chunk)] = cells
-            file.write(json.dumps({'piece': ', '.join(chunk), 'cells': cells}) + '\n')
+        for part, cells in finished_forked(work, left, options.workers, options.budget_s):
+            found[', '.join(part)] = cells
+            file.write(json.dumps({'part': ', '.join(part), 'cells': cells}) + '\n')
             file.flush()
-    missing = [chunk for chunk in map(', '.join, chunks) if chunk not in found]
+    missing = [part for part in map(', '.join, parts) if part not in found]
     missing += [f'{name} (no recordings)' for name, one in sets.items() if one.data not in slides]
     if not missing:
         path.unlink()
@@ -178,12 +178,12 @@ def _read(reader: Reader, options: BenchmarkOptions) -> SlideDataset | InvalidDa
 def _finished(path: Path) -> dict[str, list[Figures]]:
     """Return the figures of the parts in a file, by their names."""
     lines = path.read_text(encoding='utf-8').splitlines() if path.is_file() else []
-    return {line['piece']: line['cells'] for line in map(json.loads, lines)}
+    return {line['part']: line['cells'] for line in map(json.loads, lines)}
 
 
-def _piece(slides: Mapping[str, SlideDataset], seed: int, chunk: tuple[str, str]) -> list[Figures]:
+def _run_part(slides: Mapping[str, SlideDataset], seed: int, part: tuple[str, str]) -> list[Figures]:
     """Return table, row and figures of each cell of one recipe on one set."""
-    name, recipe = chunk
+    name, recipe = part
     source = {**SETS, **REDUCED}[name]
     found: defaultdict[tuple[str, str], dict[str, list[Answer]]] = defaultdict(lambda: defaultdict(list))
     for (table, row, _, draw), answers in answers_of(source.make(slides[source.data]), seed, recipe_of, recipe):
