@@ -254,3 +254,12 @@ def test_the_launch_files_name_every_emulated_sensor(file) -> None:
 def test_the_page_of_sensors_names_every_sensor() -> None:
     table = (ROOT / 'docs/sensors.md').read_text().split('## Connect')[0]
     assert set(SENSORS) <= set(re.findall(r'`(\w+)`', table))
+
+
+@pytest.mark.parametrize('file', ['tactile', 'ur'])
+def test_the_settings_of_a_sensor_reach_its_node(file) -> None:
+    given = {'emulated': 'false', 'device': '/dev/ttyACM0', 'sensor_config': 'four_channels.yaml'}
+    given |= {'ip': '192.0.2.1'} if file == 'ur' else {}
+    nodes = read(ROOT / f'src/texture_bringup/launch/{file}.launch.xml', given, dict(os.environ))
+    [sensor] = [node for node in nodes if node.executable == 'sensor']
+    assert {'config': 'four_channels.yaml'} in [*sensor.parameters]

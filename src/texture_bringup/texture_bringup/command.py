@@ -3,8 +3,8 @@
 """The `texture` command: everything a user does with the suite, one sub-command each.
 
 A package brings its sub-commands in its folder `commands`: the shared `setup.py` declares each module as an entry point
-of the group `texture.commands`, and each `Command` of a module for which the manifest lists several. A package of
-other packages may declare theirs in the same way.
+of the group `texture.commands`, and each `Command` of a module for which the manifest lists several. Third-party
+packages may declare theirs in the same way.
 """
 
 from __future__ import annotations
