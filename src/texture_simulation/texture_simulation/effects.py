@@ -213,6 +213,60 @@ def _lagging(place_m: Array, held_m: Array, last: Array, weight: Array) -> Array
 
 
 # --------------------
+# A robot does not move quite evenly, and the skin creeps.
+
+# Cubic B-spline through normal values: the standard deviation of its sum in the mean over a section.
+SPLINE_SPREAD = math.sqrt(151 / 315)
+
+
+@dataclass(frozen=True)
+class UnevenMotion:
+    """The skin is ahead of the planned path or behind it by a smooth random distance."""
+
+    distance_m: float = param(
+        5e-4, 'Standard deviation of the distance from the path, along x and along y.', unit='m', low=0.0, high=0.01
+    )
+    length_m: float = param(0.015, 'Way over which the distance changes.', unit='m', low=1e-3, high=1.0)
+
+    def start_path(self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape) -> TrajectoryFilter:
+        """Return what displaces the skin."""
+        knots = np.empty((2, *batch_shape, 0))
+        travelled = np.zeros((*batch_shape, 1))  # in sections
+        last: tuple[Array, Array] | None = None
+
+        def displace(path: Trajectory) -> Trajectory:
+            nonlocal knots, travelled, last
+            if not len(path):
+                return path
+            # How far along its way each point is: at rest nothing changes.
+            shape = (*batch_shape, len(path))
+            x_m, y_m = np.broadcast_to(path.x_m, shape), np.broadcast_to(path.y_m, shape)
+            from_x_m, from_y_m = (x_m[..., :1], y_m[..., :1]) if last is None else last
+            steps_m = np.hypot(np.diff(x_m, prepend=from_x_m), np.diff(y_m, prepend=from_y_m))
+            at = travelled + np.cumsum(steps_m, axis=-1) / self.length_m
+            last, travelled = (x_m[..., -1:], y_m[..., -1:]), at[..., -1:]
+            # A smooth curve near normal values, one a section.
+            section = at.astype(np.intp)
+            missing = max(0, int(section.max()) + 4 - knots.shape[-1])
+            drawn = [rng.standard_normal((2, *batch_shape, 1)) for _ in range(missing)]
+            knots = np.concatenate([knots, *drawn], axis=-1)
+            weights = _spline_weights(at - section)
+            size_m = self.distance_m / SPLINE_SPREAD
+            dx_m, dy_m = (
+                size_m * sum(w * np.take_along_axis(one, section + i, axis=-1) for i, w in enumerate(weights))
+                for one in knots
+            )
+            return Trajectory(x_m + dx_m, y_m + dy_m, path.force_n)
+
+        return displace
+
+
+def _spline_weights(t: Array) -> tuple[Array, ...]:
+    """Return the weights of four values in a cubic B-spline at a fraction of the section between the middle ones."""
+    return (1 - t) ** 3 / 6, (3 * t**3 - 6 * t**2 + 4) / 6, (-3 * t**3 + 3 * t**2 + 3 * t + 1) / 6, t**3 / 6
+
+
+# --------------------
 # A robot is not quite as fast and does not press quite as hard as it should.
 
 MIN_FRACTION = 0.05  # of the request
@@ -264,6 +318,7 @@ class Unevenness:
 
 EFFECTS: Mapping[str, type] = {
     'slide_error': SlideError,  # the robot is faster or slower, presses harder or less than it should
+    'uneven_motion': UnevenMotion,  # the skin is ahead of its path or behind
     'skids': Skids,  # the skin sticks for a moment and jumps after
     'patch_growth': PatchGrowth,  # a harder pressed finger senses fine textures less
     'force_gain': ForceGain,  # a harder pressed finger senses textures more
