@@ -47,7 +47,6 @@ FEATURES: Mapping[str, type[Feature]] = {
     'mean_log_bands': spectral.MeanLogBands,
     'low_fft_bins': spectral.LowFftBins,
     'hjorth': temporal.Hjorth,  # Hjorth 1970; Kaboli et al. 2015
-    'short_time_fourier': spectral.ShortTimeFourier,
     'moments': temporal.Moments,
     'power_autocorrelation': spectral.PowerAutocorrelation,
     'mean': temporal.ChannelMean,
@@ -59,11 +58,8 @@ FEATURES: Mapping[str, type[Feature]] = {
     'spatial_variation': taxels.SpatialVariation,  # Lieber & Bensmaia 2019
     'spatial_band_power': taxels.SpatialBandPower,
     'peak_to_median_power': spectral.PeakToMedianPower,
-    'spatial_bands': taxels.SpatialBands,
     'mean_spatial_bands': taxels.MeanSpatialBands,
     'mean_statistics': taxels.ChannelMeanStatistics,
-    'log_shares': taxels.LogShares,  # Aitchison 1986, with signs
-    'relative_changes': taxels.RelativeChanges,
     'difference_correlation': taxels.DifferenceCorrelation,
     'load_level': taxels.LoadLevel,
     'speed': temporal.Speed,

@@ -556,7 +556,8 @@ def _steady_ns(steady_s: float) -> int:
 # --------------------
 # Cut windows from the sliding part of tactile streams, as soon as the last sample of each is there.
 
-TIMEOUT_S = 0.3
+# For how long a slide that is over waits for its last samples; the explorer's `estimate_timeout_s` must be longer.
+LATE_SAMPLES_S = 0.3
 DROPPED_S = 1.0  # an input that is silent for so long while others come is reported
 ALL = 1 << 62
 
@@ -687,7 +688,7 @@ class WindowCutter:
             if source.received or math.isnan(source.received_s):
                 source.received, source.received_s = False, now_s
         awaited = [source for source in self._inputs.values() if source.due < math.inf]
-        silent = any(now_s - source.received_s >= TIMEOUT_S for source in awaited)
+        silent = any(now_s - source.received_s >= LATE_SAMPLES_S for source in awaited)
         return events + (self._give_up() if silent else [])
 
     def finish(self) -> list[WindowEvent]:

@@ -166,11 +166,6 @@ def spatial_log_bands(windows: WindowBatch, edges_per_m: Array, floor: float) ->
     return np.where(moving[..., None, None], logarithm, np.nan)
 
 
-def mean_subtracted(log_bands: Array) -> Array:
-    """Return log bands less their mean over the bands: how hard and how fast the finger presses is mostly level."""
-    return log_bands - np.add.reduce(log_bands, axis=-1, keepdims=True) / log_bands.shape[-1]
-
-
 def _mean_between(density: Array, edges: Array) -> Array:
     """Return the mean of a density, (..., n_lines), between fractions of lines, (..., n_edges)."""
     last = density.shape[-1] - 1
@@ -480,54 +475,6 @@ class PowerAutocorrelation(Feature):
             (products + POWER_AUTOCORRELATION_TINY) / (mean * mean + POWER_AUTOCORRELATION_TINY) + LEAST_RATIO
         )
         return autocorrelations.reshape(*powers.shape[:-2], -1)
-
-
-# --------------------
-# How the power in frequency bands changes over the window.
-
-
-@dataclass(frozen=True)
-class ShortTimeFourier(Feature):
-    """Logarithm of the power spectral density in equal bands, for each of some equal parts of the window.
-
-    The short-time Fourier transform, averaged within each part. Where a window has fewer segments than parts,
-    neighbouring parts share one.
-
-    Examples
-    --------
-    >>> time_s = np.arange(1000) / 1000.0
-    >>> chirp = np.where(time_s < 0.5, np.sin(2 * np.pi * 100.0 * time_s), np.sin(2 * np.pi * 300.0 * time_s))[:, None]
-    >>> feature = ShortTimeFourier(parts=2, bands=10)  # bands at 50, 100, … 500 Hz
-    >>> values = feature(WindowBatch(chirp, rate_hz=1000.0)).reshape(2, 10)
-    >>> (values.argmax(axis=1) + 1).tolist()
-    [2, 6]
-    """
-
-    parts: int = param(4, 'Number of equal time segments of the window.', low=1, high=256)
-    bands: int = param(16, 'Number of frequency bands; a segment is twice as many samples long.', low=2, high=512)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Part and band, each from 1."""
-        return tuple(f'{part + 1}/{band + 1}' for part in range(self.parts) for band in range(self.bands))
-
-    def __call__(self, windows: WindowBatch) -> Array:
-        """Return log(mean density of each part + floor), part by part."""
-        densities = densities_of(windows, 2 * self.bands, self.bands, self.bands)  # segments overlap by half
-        means = _averaging(self.parts, densities.shape[-2]) @ densities
-        return np.log(means + FLOOR).reshape(*means.shape[:-2], -1)
-
-
-@lru_cache(maxsize=64)
-def _averaging(parts: int, segments: int) -> Array:
-    """Return the matrix (parts, segments) whose product with segments is the mean of each part."""
-    first = np.arange(parts) * segments // parts
-    last = np.maximum(np.arange(1, parts + 1) * segments // parts, first + 1)
-    index = np.arange(segments)
-    belongs = ((index >= first[:, None]) & (index < last[:, None])).astype(np.float64)
-    matrix: Array = belongs / belongs.sum(axis=1, keepdims=True)
-    matrix.flags.writeable = False
-    return matrix
 
 
 # --------------------
