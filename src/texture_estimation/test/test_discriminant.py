@@ -10,7 +10,7 @@ import pytest
 from texture_core.config import folder
 from texture_estimation.domain import ONE_PLACE
 from texture_estimation.evidence import EvidenceAccumulator
-from texture_estimation.evidence_rules import SoftVote, running_means
+from texture_estimation.evidence_rules import SoftVote, followed
 from texture_estimation.learners.discriminant import Discriminant, ForceDiscriminant, linear_discriminant
 from texture_estimation.recipe import Recipe
 from texture_estimation.training import held_out_parts, in_places, train
@@ -183,20 +183,15 @@ def test_held_out_slides_are_followed_as_the_classifier_follows_them(estimates_o
     examples = force_examples()
     rule = SoftVote(late_weight=0.25)
     evidence, trusted = np.log([[0.9, 0.1], [0.2, 0.8], [0.6, 0.4]]), np.array([0.25, 0.5, 0.5])
-    means = running_means(rule, evidence, np.array([1.0, 1.5, 2.0]), trusted)
+    means, _ = followed(rule, evidence, 0.5, trusted)
     assert means[0] == pytest.approx(0.25 * evidence[0])  # a quarter of a window is trusted
     assert means[1] == pytest.approx(0.5 * (0.25 * evidence[0] + 0.5 * evidence[1]) / 0.75)
     model = train(Recipe.from_mapping({**CONTENT, 'learner': 'force_discriminant'}, 'forces'), examples)
     forces = [1.0, 4.5, 40.0, 1.0]
     values = np.array([[3.0 if force < 2.0 else -3.0, force] for force in forces])
-    effective = 1.0 + 0.5 * np.arange(4)
-    followed = running_means(
-        model.recipe.evidence,
-        model.predict_log_proba(values),
-        effective,
-        np.array([model.trust(row) for row in values]),
-    )
-    expected = np.exp(model.recipe.evidence.log_posterior(followed, effective[:, None], model.tempering_exponent))
+    trusted = np.array([model.trust(row) for row in values])
+    means, effective = followed(model.recipe.evidence, model.predict_log_proba(values), 0.5, trusted)
+    expected = np.exp(model.recipe.evidence.log_posterior(means, effective[:, None], model.tempering_exponent))
     found = probabilities_after(estimates_of, model, forces)
     assert found == pytest.approx([model.acceptance.limited(row)[0] for row in expected])
 

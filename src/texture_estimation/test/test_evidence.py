@@ -15,7 +15,6 @@ from texture_estimation.evidence_rules import (
     MajorityVote,
     SoftVote,
     followed,
-    running_means,
 )
 from texture_estimation.learners.learner import is_tied, log_softmax
 from texture_estimation.recipe import load_recipe
@@ -248,8 +247,7 @@ def test_many_slides_at_once_are_joined_as_one_by_one(name):
 
 def test_windows_late_in_a_slide_count_as_much_as_the_rule_defines():
     evidence = np.array([[0.0, -1.0]] * 5 + [[-1.0, 0.0]] * 8)
-    counts = np.arange(1.0, 14.0)
-    equal, less = (running_means(SoftVote(late_weight=weight), evidence, counts) for weight in (1.0, 0.25))
+    equal, less = (followed(SoftVote(late_weight=weight), evidence, 1.0)[0] for weight in (1.0, 0.25))
     np.testing.assert_allclose(equal[:5], less[:5])
     np.testing.assert_allclose(equal[-1], [-8 / 13, -5 / 13])
     np.testing.assert_allclose(less[-1], [-2 / 7, -5 / 7])  # eight quarters are two windows

@@ -71,7 +71,8 @@ def store_reference(
             f'nothing is stored, for two slides over the plate differ: {"; ".join(faults)}. Clean and fasten the '
             'finger, stop other programs on the computer, and store again'
         )
-    path = write_reference(model, last, _numbers_of(request) if request else _numbers_shown(slides[-1]))
+    made = {name: getattr(request, name) for name in SLIDE_NUMBERS} if request else _numbers_shown(slides[-1])
+    path = write_reference(model, last, made)
     unknown = '' if all(np.isfinite(one.rest_rms).all() for one in last.values()) else f'; {UNMEASURED}'
     return f"the slide is stored as the reference of the finger, '{path}'{unknown}"
 
@@ -108,10 +109,6 @@ def check_finger(
 
 def _faults(found: Mapping[str, InputComparison]) -> list[str]:
     return [f'{topic}: {fault}' for topic, one in found.items() for fault in one.faults]
-
-
-def _numbers_of(request: ExplorationRequest) -> dict[str, float]:
-    return {name: getattr(request, name) for name in SLIDE_NUMBERS}
 
 
 def _numbers_shown(slide: LabelledSlide) -> dict[str, float]:

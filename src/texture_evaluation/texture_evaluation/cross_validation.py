@@ -54,18 +54,6 @@ def single_blas_thread() -> AbstractContextManager[Any]:
 
 
 @contextmanager
-def workers(jobs: int = -1, dask: str = '') -> Iterator[None]:
-    """Have joblib use this many cores (-1: all) within a `with` block, or the cluster whose address is given.
-
-    Threads, not processes: what takes the time (libsvm, products of arrays) lets go of Python's lock, and nothing is
-    copied.
-    """
-    spread = dask_backend(dask) if dask else parallel_config(backend='threading', n_jobs=jobs)
-    with single_blas_thread(), spread:
-        yield
-
-
-@contextmanager
 def dask_backend(address: str) -> Iterator[None]:
     """Have joblib use the workers of a Dask cluster, which have this suite installed, within a `with` block."""
     cluster_of = library('distributed', "Dask clusters ('--dask')", 'dask')
@@ -214,10 +202,6 @@ class ChronologicalSplit:
         if not 0.0 < train_size < 1.0:
             raise InvalidParameter(f'train_size is {train_size}; a fraction above 0 and below 1 is needed')
         self.train_size = train_size
-
-    def get_n_splits(self, *_args: object, **_named: object) -> int:
-        """Return 1, whatever else scikit-learn's splitters take."""
-        return 1
 
     def split(  # X is there because scikit-learn's splitters have it
         self,
