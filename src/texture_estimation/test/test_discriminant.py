@@ -43,26 +43,25 @@ def test_gaussian_classes_of_known_means_and_variance_get_their_probabilities():
     assert scores[:, 1] - scores[:, 0] == pytest.approx([-2.0, 0.0, 2.0], abs=0.15)
 
 
-def test_slides_of_one_day_are_held_out_together(examples):
-    parts = held_out_parts(of_days(examples))
-    slides = np.unique(examples.groups)
-    assert [part == int(slide[-1]) % 2 for part, slide in zip(parts.tolist(), slides.tolist(), strict=True)] == [
-        True
-    ] * len(slides)
+def day(slide):
+    return f'day {int(slide[-1]) % 2}'
 
 
-def test_without_days_slides_are_held_out_by_themselves(examples):
-    assert held_out_parts(examples) is None
-    assert held_out_parts(of_days(examples, days=1)) is None
-    by_slide = {slide: SlideConditions(session=slide) for slide in np.unique(examples.groups).tolist()}
-    assert held_out_parts(replace(examples, conditions=by_slide)) is None
-
-
-def test_places_are_held_out_in_turn_where_each_slide_has_a_separate_bag(examples):
+@pytest.mark.parametrize(
+    ('session', 'place', 'by_day'),
+    [
+        (day, lambda slide: '', True),
+        (lambda slide: slide, day, True),  # a bag for each slide defines no session, but places are held out
+        (lambda slide: slide, lambda slide: '', False),
+        (lambda slide: 'day 0', lambda slide: '', False),
+        (lambda slide: '', lambda slide: '', False),
+    ],
+)
+def test_slides_of_one_day_or_place_are_held_out_together_and_else_by_themselves(session, place, by_day, examples):
     slides = np.unique(examples.groups).tolist()
-    made = {slide: SlideConditions(session=slide, place=str(int(slide[-1]) % 2)) for slide in slides}
+    made = {slide: SlideConditions(session=session(slide), place=place(slide)) for slide in slides}
     parts = held_out_parts(replace(examples, conditions=made))
-    assert parts.tolist() == [int(slide[-1]) % 2 for slide in slides]
+    assert parts is None if not by_day else parts.tolist() == [int(slide[-1]) % 2 for slide in slides]
 
 
 def test_a_label_of_one_day_is_held_out_slide_by_slide(examples):

@@ -182,7 +182,7 @@ def followed(
         stop = np.where(counts < rule.group, counts, first + rule.group)
         newest = np.stack([evidence[one:other].mean(axis=0) for one, other in zip(first, stop, strict=True)])
         return newest, 1.0 + (stop - first - 1.0) * hop_ratio
-    effective_windows: Array = 1.0 + (counts - 1.0) * hop_ratio
+    effective_windows: Array = 1.0 + np.arange(len(evidence), dtype=np.float64) * hop_ratio
     weights = np.broadcast_to(trusted * rule.window_weight(effective_windows), len(evidence))[:, None]
     means: Array = np.cumsum(weights * evidence, axis=0) / np.cumsum(weights, axis=0)
     if np.ndim(trusted):

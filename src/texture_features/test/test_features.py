@@ -17,7 +17,6 @@ from texture_features.features.spectral import (
     segment_densities,
 )
 from texture_features.features.taxels import SpatialBandPower, SpatialVariation
-from texture_features.features.temporal import hjorth
 from texture_features.windows import WindowBatch
 
 RATE_HZ = 1000.0
@@ -140,18 +139,13 @@ def test_density_agrees_with_scipy(n_samples):
     )
 
 
-def test_hjorth_of_a_tone_is_its_power_and_angular_frequency():
-    activity, mobility, complexity = hjorth(tone(50.0, 10_000, amplitude=2.0).T)[0]
-    assert activity == pytest.approx(2.0, rel=1e-3)
-    assert mobility == pytest.approx(2 * np.sin(np.pi * 50.0 / RATE_HZ), rel=1e-3)
-    assert complexity == pytest.approx(1.0, rel=1e-3)
-
-
 @EVERY
 @pytest.mark.parametrize('speed_m_s', [0.0, np.nan, -0.1])
 def test_without_a_speed_what_needs_one_is_not_a_number_and_the_rest_is_as_ever(name, speed_m_s):
     still, moving = (FEATURES[name]()(windows(noise(500, 2), speed_m_s=speed)) for speed in (speed_m_s, 0.1))
     assert np.array_equal(still, moving) or np.isnan(still).all() or name == 'speed'
+    if 'at_speed_m_s' in FEATURES[name].__dataclass_fields__:
+        assert np.isnan(FEATURES[name](at_speed_m_s=0.1)(windows(noise(500, 2), speed_m_s=speed_m_s))).all()
 
 
 def plain_typical_bands(row):
@@ -242,11 +236,6 @@ def test_the_spatial_level_is_that_of_the_surface_at_any_speed() -> None:
     levels = np.array([SpatialBandPower()(row_windows(wave(v), v))[0] for v in SPEEDS])
     assert set(levels.argmax(axis=1)) == {1}  # 1 mm lies in the second of four bands from 2 mm to 0.45 mm
     assert np.ptp(levels[:, 1]) < 0.1
-
-
-@pytest.mark.parametrize('feature', [SpectralExponent(at_speed_m_s=0.1), PacinianPower(at_speed_m_s=0.1)])
-def test_without_a_speed_there_is_no_value(feature) -> None:
-    assert np.isnan(feature(row_windows(wave(0.15), np.nan))).all()
 
 
 def test_waves_the_wrong_way_round_are_refused() -> None:

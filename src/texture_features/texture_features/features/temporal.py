@@ -108,8 +108,8 @@ class Hjorth(Feature):
     --------
     >>> time_s = np.arange(1000) / 1000.0
     >>> tone = WindowBatch(np.sin(2 * np.pi * 40.0 * time_s)[:, None], rate_hz=1000.0)
-    >>> Hjorth(log_activity=False)(tone)[0, :2].round(2).tolist()  # ½, and 2 sin(π · 40 / 1000)
-    [0.5, 0.25]
+    >>> Hjorth(log_activity=False)(tone)[0].round(2).tolist()  # ½, 2 sin(π · 40 / 1000), and 1 of a tone
+    [0.5, 0.25, 1.0]
     """
 
     log_activity: bool = param(True, 'Returns the logarithm of the activity instead of the activity itself.')
