@@ -191,10 +191,10 @@ class Domain:
 
     def _covers(self, direction_rad: float) -> bool:
         margin = self.margins.direction_rad
-        return any(
-            (direction_rad - start + margin) % math.tau <= end - start + 2.0 * margin
-            for start, end in self.directions_rad
-        )
+        for start, end in self.directions_rad:
+            if (direction_rad - start + margin) % math.tau <= end - start + 2.0 * margin:
+                return True
+        return False
 
 
 def _directions(slides: Sequence[SlideConditions], margin_rad: float) -> tuple[Interval, ...]:

@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from texture_core.types import NANOSECONDS, Array, FeatureVector, Rejection, TextureEstimate
-from texture_estimation.acceptance import Acceptance, SlideDistance, margin_of
+from texture_estimation.acceptance import SlideDistance, margin_of
 from texture_estimation.evidence_rules import GroupedEvidence
 from texture_estimation.gaussians import GaussianClasses, SlideMoments
 from texture_estimation.learners.learner import is_tied
@@ -178,7 +178,13 @@ class EvidenceAccumulator:
         elif not single and rejection is Rejection.NONE:
             rejection = Rejection.AMBIGUOUS
         reported = tuple(acceptance.limited(listed))
-        members = acceptance.members(probabilities, effective_windows) if final and not self._deviation else ()
+        members: list[int] = []
+        missing: tuple[str, ...] = ()
+        if final and not self._deviation:
+            members = acceptance.members(probabilities, effective_windows)
+            too_little = rejection is Rejection.TOO_LITTLE_TRAINING
+            reach = acceptance.domain.reach_reason if rejection is not Rejection.NONE else ''
+            missing = (acceptance.reason if too_little else acceptance.decided_reason, reach)
         return TextureEstimate(
             stamp_ns=self._end_ns,
             exploration_id=vector.exploration_id,
@@ -193,14 +199,5 @@ class EvidenceAccumulator:
             evidence_s=self._evidence_ns / NANOSECONDS,
             final=final,
             model=model.name,
-            message=self._explanation(acceptance, final, rejection),
+            message='; '.join(filter(None, (self._deviation, self._message, *missing))),
         )
-
-    def _explanation(self, acceptance: Acceptance, final: bool, rejection: Rejection) -> str:
-        """Return the message of an estimate for its reader, in sentences; '' if there is none."""
-        missing: tuple[str, ...] = ()
-        if final and not self._deviation:
-            too_little = rejection is Rejection.TOO_LITTLE_TRAINING
-            reach = acceptance.domain.reach_reason if rejection is not Rejection.NONE else ''
-            missing = (acceptance.reason if too_little else acceptance.decided_reason, reach)
-        return '; '.join(filter(None, (self._deviation, self._message, *missing)))

@@ -402,6 +402,10 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
             )
         distance = followed_slides.distance(bound.learner.predictor(fitted.parameters))
         acceptance = acceptance.fitted(near, far, recipe.evidence, tempering_exponent, distance)
+    accuracy = None
+    if calibrated.held_out is not None:
+        right = (calibrated.held_out.argmax(axis=1) == truth) & ~is_tied(calibrated.held_out)
+        accuracy = round(float(right.mean()), 4)
     return TextureModel(
         name=name or recipe.name,
         labels=tuple(labels.tolist()),
@@ -418,7 +422,7 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
             'window_s': examples.window_s,
             'hop_s': examples.hop_s,
             'calibration': calibrated.note,
-            'held_out_window_accuracy': _held_out_accuracy(calibrated, truth),
+            'held_out_window_accuracy': accuracy,
         },
         examples=TrainingExamples.of(examples.values, codes, groups),
     )
@@ -438,10 +442,3 @@ def _check(examples: LabelledFeatures) -> None:
             f"feature '{name}' and {int(bad.sum()) - 1} others are not finite in {windows} of {len(examples.labels)} "
             'windows; leave these features out of the recipe, or these windows out of the examples'
         )
-
-
-def _held_out_accuracy(fitted: Fitted, codes: Codes) -> float | None:
-    if fitted.held_out is None:
-        return None
-    right = (fitted.held_out.argmax(axis=1) == codes) & ~is_tied(fitted.held_out)
-    return round(float(right.mean()), 4)

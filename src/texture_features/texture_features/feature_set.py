@@ -344,12 +344,12 @@ class FeatureSet:
         by_name = dict(zip(self.window_names, inputs, strict=True))
         if self.correction is not None:
             by_name = {name: self.correction.apply(topic_of(name), window) for name, window in by_name.items()}
-        blocks = [
-            feature(windows).reshape(flat)
-            for item in self.inputs
-            for windows in [_joined([by_name[name] for name in item.window_names])]
-            for _, feature in item.features
-        ]
+        blocks = []
+        for item in self.inputs:
+            windows, *others = (by_name[name] for name in item.window_names)
+            if others:
+                windows = dataclasses.replace(windows, joined=tuple(others))
+            blocks += [feature(windows).reshape(flat) for _, feature in item.features]
         return np.concatenate(blocks, axis=-1)
 
     def _vector(self, event: CutWindow, layout: InputLayout, values: Array) -> FeatureVector:
@@ -410,19 +410,12 @@ def _input(topic: str, section: Any, where: str) -> InputFeatures:
     options = from_mapping(InputOptions, {key: value for key, value in section.items() if key != 'features'}, place)
     if options.stretch_to_m_s and len(topics) > 1:
         raise InvalidParameter(f'{place}: joined inputs cannot be stretched; leave stretch_to_m_s out')
-    features = tuple((name, _prepared(feature, options)) for name, feature in chosen)
-    return InputFeatures(topic, features, options.tare)
-
-
-def _prepared(feature: Feature, options: InputOptions) -> Feature:
-    """Return the feature of the input as the options change it; features of the motion itself stay as they are."""
-    if not options.stretch_to_m_s or isinstance(feature, MOTION_FEATURES):
-        return feature
-    return Stretched(feature, options.stretch_to_m_s)
-
-
-def _joined(windows: Sequence[WindowBatch]) -> WindowBatch:
-    return windows[0] if len(windows) == 1 else dataclasses.replace(windows[0], joined=tuple(windows[1:]))
+    if options.stretch_to_m_s:  # features of the motion itself stay as they are
+        chosen = [
+            (name, one if isinstance(one, MOTION_FEATURES) else Stretched(one, options.stretch_to_m_s))
+            for name, one in chosen
+        ]
+    return InputFeatures(topic, tuple(chosen), options.tare)
 
 
 def _names(item: InputFeatures, channels: tuple[str, ...]) -> Iterable[str]:

@@ -163,9 +163,13 @@ def centred(rows: Array) -> Array:
 @lru_cache(maxsize=64)
 def mean_weights(count: int) -> Array:
     """Return 1 / count, `count` times: what a mean is a product with."""
-    equal = np.full(count, 1.0 / count)
-    equal.flags.writeable = False
-    return equal
+    return shared_constant(np.full(count, 1.0 / count))
+
+
+def shared_constant(array: Array) -> Array:
+    """Return an array that is computed once and shared, and therefore may not be changed."""
+    array.flags.writeable = False
+    return array
 
 
 def power(rows: Array) -> Array:
@@ -454,9 +458,14 @@ class SlideCoverage:
                 return False
             start = before if stamp - before <= LINK_NS and not self._withdrawn else stamp
         self._promising |= state.steady_s > 0
-        self._cover(start, stamp + _steady_ns(state.steady_s))
+        self._cover(start, stamp + round(min(max(0.0, state.steady_s), MAX_STEADY_S) * NANOSECONDS))
         self._withdrawn = self._promising and not state.steady_s > 0
-        if self._withdrawn and self._is_far(state):
+        far = (
+            state.force_n < LEAST_FORCE * self._force.value
+            or state.force_n > MOST_FORCE * self._force.value
+            or state.speed_m_s > MOST_SPEED * self._speed.value
+        )
+        if self._withdrawn and far:
             self._intervals[-1][1] = min(self._intervals[-1][1], stamp)
         if state.steady_s > 0:
             self._force.update(state.force_n)
@@ -487,14 +496,6 @@ class SlideCoverage:
         count = min(count, left)
         self._next_ns += count * self._hop_ns
         return count
-
-    def _is_far(self, state: ExplorationState) -> bool:
-        force_n, speed_m_s = self._force.value, self._speed.value
-        return (
-            state.force_n < LEAST_FORCE * force_n
-            or state.force_n > MOST_FORCE * force_n
-            or state.speed_m_s > MOST_SPEED * speed_m_s
-        )
 
     def _cover(self, start: int, end: int) -> None:
         if self._intervals and start <= self._intervals[-1][1]:
@@ -547,10 +548,6 @@ class RunningMean:
             self.value = mean = self._sum / self._count
             low, high = self.range
             self.range = (low if low <= mean else mean, high if high >= mean else mean)  # NaN is neither
-
-
-def _steady_ns(steady_s: float) -> int:
-    return round(min(steady_s, MAX_STEADY_S) * NANOSECONDS) if steady_s > 0 else 0
 
 
 # --------------------
@@ -738,7 +735,20 @@ class WindowCutter:
                 self._skip(slide, self._lost)
                 continue
             slide.advance()
-            event: CutWindow | None = self._window_event(slide, span, found)
+            event: CutWindow | None = CutWindow(
+                start_ns=span.start_ns,
+                exploration_id=slide.exploration_id,
+                length_s=self._params.length_s,
+                hop_s=self._params.hop_s,
+                windows=found,
+                speed_m_s=span.speed_m_s,
+                force_n=span.force_n,
+                surface=slide.surface,
+                skipped=slide.skipped,
+                motion=slide.motion,
+                direction_rad=span.direction_rad,
+                tangential_force_n=span.tangential_force_n,
+            )
             if self._joiner.joins and event is not None:
                 event = self._joiner.add(event)
             if event is not None:
@@ -770,7 +780,11 @@ class WindowCutter:
             count = max(1, round(self._params.length_s * buffer.rate_hz))
             if first >= buffer.first_sample and first + count <= buffer.next_sample:
                 source.due = math.inf
-                return _finite_window(buffer, first, count, span)
+                samples = buffer.take(first, count)
+                if not np.isfinite(samples).all():
+                    return _Missing.LOST
+                rate_hz, names, sensor = buffer.rate_hz, buffer.channels, buffer.sensor
+                return Window(samples, rate_hz, names, span.start_ns, span.speed_m_s, span.force_n, sensor)
             state = _Missing.LOST if first < buffer.first_sample else _Missing.LATE
             source.due = first + count
             if state is _Missing.LOST:
@@ -781,22 +795,6 @@ class WindowCutter:
             source.due = math.inf
             self._lost = max(1, lost)
         return state
-
-    def _window_event(self, slide: SlideCoverage, span: CoveredSpan, windows: Mapping[str, Window]) -> CutWindow:
-        return CutWindow(
-            start_ns=span.start_ns,
-            exploration_id=slide.exploration_id,
-            length_s=self._params.length_s,
-            hop_s=self._params.hop_s,
-            windows=windows,
-            speed_m_s=span.speed_m_s,
-            force_n=span.force_n,
-            surface=slide.surface,
-            skipped=slide.skipped,
-            motion=slide.motion,
-            direction_rad=span.direction_rad,
-            tangential_force_n=span.tangential_force_n,
-        )
 
     def _skip(self, slide: SlideCoverage, count: int) -> None:
         skipped = slide.advance(count)
@@ -853,13 +851,6 @@ def cut_recording(
         add(item)
         yield from cutter.take()
     yield from cutter.finish()
-
-
-def _finite_window(buffer: SampleBuffer, first: int, count: int, span: CoveredSpan) -> Window | _Missing:
-    samples = buffer.take(first, count)
-    if not np.isfinite(samples).all():
-        return _Missing.LOST
-    return Window(samples, buffer.rate_hz, buffer.channels, span.start_ns, span.speed_m_s, span.force_n, buffer.sensor)
 
 
 def _calls(add: Callable[[Any], None], items: Iterable[Any]) -> Iterator[tuple[int, Callable[[Any], None], Any]]:

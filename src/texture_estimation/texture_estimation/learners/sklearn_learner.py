@@ -23,7 +23,6 @@ from texture_estimation.learners.learner import (
     Fitted,
     assign_folds,
     fit_temperature,
-    held_out_scores,
     log_softmax,
     standardisation,
 )
@@ -230,13 +229,17 @@ class SklearnLearner:
         InvalidParameter
             If there is no such classifier or parameter.
         """
-        cls = _classifier(self.estimator)
+        from sklearn.base import BaseEstimator, is_classifier  # noqa: PLC0415  # takes a second to import
+
+        cls = _public_class(self.estimator)
         try:
             estimator = cls()
         except TypeError as error:
             raise InvalidParameter(
                 f"'{self.estimator}' needs other estimators as parameters ({error}); name one that works alone"
             ) from error
+        if not (isinstance(estimator, BaseEstimator) and is_classifier(estimator)):
+            raise InvalidParameter(f"'{self.estimator}' is not a classifier; name one such as {EXAMPLE}")
         known = estimator.get_params()
         for name, _ in self.parameters:
             if name not in known:
@@ -257,9 +260,11 @@ class SklearnLearner:
         parameters = {'packed': packed(fitted.estimator, self.estimator), 'mean': fitted.mean, 'scale': fitted.scale}
         split = assign_folds(y, groups, FOLDS, parts)
         if split is None:
-            note = UNCALIBRATED
-            return Fitted({**parameters, 'n_labels': n_labels, 'temperature': 1.0}, None, note)
-        held_out = held_out_scores(lambda held: self._fit(X[~held], y[~held], n_labels), X, split[0], n_labels)
+            return Fitted({**parameters, 'n_labels': n_labels, 'temperature': 1.0}, None, UNCALIBRATED)
+        held_out = np.empty((len(X), n_labels))
+        for part in np.unique(split[0]):
+            held = split[0] == part
+            held_out[held] = self._fit(X[~held], y[~held], n_labels)(X[held])
         temperature = fit_temperature(held_out, y)
         return Fitted(
             {**parameters, 'n_labels': n_labels, 'temperature': temperature},
@@ -283,10 +288,7 @@ class SklearnLearner:
         return SklearnPredictor(estimator, mean, scale, n_labels)
 
 
-def _classifier(name: str) -> Any:
-    """Return a public class of scikit-learn that classifies."""
-    from sklearn.base import BaseEstimator, is_classifier  # noqa: PLC0415  # takes a second to import
-
+def _public_class(name: str) -> Any:
     if not PUBLIC_CLASS.fullmatch(name):
         raise InvalidParameter(
             f'estimator is {safe_repr(name)}; a public class of scikit-learn such as {EXAMPLE} is needed; '
@@ -294,21 +296,11 @@ def _classifier(name: str) -> Any:
         )
     module, cls_name = name.split(':')
     try:
-        cls = getattr(importlib.import_module(module), cls_name)
+        return getattr(importlib.import_module(module), cls_name)
     except (ImportError, AttributeError) as error:
         raise InvalidParameter(
             f"there is no '{cls_name}' in '{module}'; name a classifier such as {EXAMPLE}"
         ) from error
-    if not (isinstance(cls, type) and issubclass(cls, BaseEstimator) and _classifies(cls, is_classifier)):
-        raise InvalidParameter(f"'{name}' is not a classifier; name one such as {EXAMPLE}")
-    return cls
-
-
-def _classifies(cls: Any, is_classifier: Any) -> bool:
-    try:
-        return bool(is_classifier(cls()))
-    except TypeError:  # it needs other estimators; the caller reports it
-        return hasattr(cls, 'predict')
 
 
 def _plain(name: str, value: Any) -> Any:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from texture_core.config import param
 from texture_core.types import Array
 from texture_features.features.temporal import signal_differences
-from texture_features.windows import FLOOR, Feature, WindowBatch, mean_weights, power
+from texture_features.windows import FLOOR, Feature, WindowBatch, mean_weights, power, shared_constant
 
 # --------------------
 # Short spectra along a window: what the spectral features are made of.
@@ -73,11 +73,12 @@ def overlapping(rows: Array, length: int, step: int) -> Array:
     )
 
 
-def densities_of(windows: WindowBatch, segment: int, step: int, bins: int) -> Array:
-    """Return the densities of the segments of windows; features with equal parameters share them."""
+def quarter_densities(windows: WindowBatch, bands: int) -> Array:
+    """Return the densities of the segments of windows, a quarter of a segment apart; features share them."""
+    step = max(1, bands // 2)
     return windows.shared(
-        ('densities', segment, step, bins),
-        lambda: segment_densities(windows.centred_rows, windows.rate_hz, segment, step, bins),
+        ('densities', bands),
+        lambda: segment_densities(windows.centred_rows, windows.rate_hz, 2 * bands, step, bands),
     )
 
 
@@ -115,9 +116,7 @@ def amplitudes_of(windows: WindowBatch, points: int) -> tuple[Array, float]:
 @lru_cache(maxsize=64)
 def hann(length: int) -> Array:
     """Return a Hann window that is nowhere 0: taken in the middle of each sample."""
-    window: Array = np.sin(np.pi * (np.arange(length) + 0.5) / length) ** 2
-    window.flags.writeable = False
-    return window
+    return shared_constant(np.sin(np.pi * (np.arange(length) + 0.5) / length) ** 2)
 
 
 @lru_cache(maxsize=64)
@@ -134,9 +133,7 @@ def _transform(length: int, segment: int, bins: int, rate_hz: float) -> Array:
     # The bins count for both signs of frequency, but for the one at half the sampling rate, which has no other.
     scale = np.full(bins, 2.0 / (rate_hz * float(taper @ taper)))
     scale[segment // 2 - 1 :] /= 2.0
-    matrix: Array = np.ascontiguousarray((waves * np.sqrt(np.tile(scale, 2))).T)
-    matrix.flags.writeable = False
-    return matrix
+    return shared_constant(np.ascontiguousarray((waves * np.sqrt(np.tile(scale, 2))).T))
 
 
 # --------------------
@@ -228,11 +225,8 @@ def at_reference_speed(hertz: Array, windows: WindowBatch, speed_m_s: float) -> 
 @lru_cache(maxsize=64)
 def _lines(segment: int, rate_hz: float) -> tuple[Array, Array]:
     """Return the frequency of each line, (segment / 2,) Hz, and the fraction of its density that its integral has."""
-    hertz: Array = np.arange(1, segment // 2 + 1, dtype=np.float64) * (rate_hz / segment)
-    integration: Array = 1.0 / (2.0 * np.pi * hertz) ** 2
-    for array in (hertz, integration):
-        array.flags.writeable = False
-    return hertz, integration
+    hertz = shared_constant(np.arange(1, segment // 2 + 1, dtype=np.float64) * (rate_hz / segment))
+    return hertz, shared_constant(1.0 / (2.0 * np.pi * hertz) ** 2)
 
 
 # --------------------
@@ -258,14 +252,9 @@ class LogBands(Feature):
         """Number of the band, from 1."""
         return tuple(str(band + 1) for band in range(self.bands))
 
-    @cached_property
-    def _step(self) -> int:
-        return max(1, self.bands // 2)  # a quarter of a segment
-
     def __call__(self, windows: WindowBatch) -> Array:
         """Return log(mean density + floor)."""
-        densities = densities_of(windows, 2 * self.bands, self._step, self.bands)
-        return np.log(mean_over_segments(densities) + FLOOR)
+        return np.log(mean_over_segments(quarter_densities(windows, self.bands)) + FLOOR)
 
 
 # --------------------
@@ -333,8 +322,7 @@ class MeanLogBands(LogBands):
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the mean of log(density + floor)."""
-        densities = densities_of(windows, 2 * self.bands, self._step, self.bands)
-        logs = densities + FLOOR
+        logs = quarter_densities(windows, self.bands) + FLOOR
         return mean_over_segments(np.log(logs, out=logs))
 
 

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -163,8 +163,33 @@ class LoadLevel(Feature):
 MIN_LINES = 1e-3
 
 
+class OctaveBands:
+    """Bands of waves per metre between the longest and the shortest wave, equally wide in octaves."""
+
+    bands: int
+    longest_m: float
+    shortest_m: float
+
+    def __post_init__(self) -> None:
+        if not self.shortest_m < self.longest_m:
+            raise InvalidParameter(
+                f'waves from {self.shortest_m} m to {self.longest_m} m came; the longest must be longer'
+            )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Number of the band, from 1."""
+        return tuple(str(band + 1) for band in range(self.bands))
+
+    @cached_property
+    def edges_per_m(self) -> Array:
+        """The edges of the bands, waves per metre, (bands + 1,)."""
+        edges = np.geomspace(1.0 / self.longest_m, 1.0 / self.shortest_m, self.bands + 1)
+        return np.asarray(edges, dtype=np.float64)
+
+
 @dataclass(frozen=True)
-class SpatialBandPower(WelchPower):
+class SpatialBandPower(OctaveBands, WelchPower):
     """Logarithm of the mean density in bands of waves per metre, f / speed; longest waves first.
 
     Bands are equally wide in octaves. Choose waves that the sensor reaches at every speed: from v / high_hz to
@@ -188,26 +213,15 @@ class SpatialBandPower(WelchPower):
         4.5e-4, 'Shortest wavelength, which is the upper edge of the last band.', unit='m', low=1e-6, high=1.0
     )
 
-    def __post_init__(self) -> None:
-        if not self.shortest_m < self.longest_m:
-            raise InvalidParameter(
-                f'waves from {self.shortest_m} m to {self.longest_m} m came; the longest must be longer'
-            )
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Number of the band, from 1."""
-        return tuple(str(band + 1) for band in range(self.bands))
-
     def __call__(self, windows: WindowBatch) -> Array:
         """Return log(mean density + floor) of each band."""
         densities, hertz = welch_spectrum(windows, self.points, self.rate_of_change)
         speed = windows.moving_m_s[..., None, None, None]
         # Line n, from 0, covers the stretch from n to n + 1; edges are also in lines.
-        edges = _edges_1_m(self) * (speed / hertz[0]) - 0.5
+        edges = self.edges_per_m[:, None] * (speed / hertz[0]) - 0.5
         low = np.minimum(np.maximum(edges[..., :-1, :], 0.0), len(hertz) - 1.0)
         high = np.minimum(np.maximum(edges[..., 1:, :], low + MIN_LINES), len(hertz))
-        line = _numbers(len(hertz) + 1)
+        line = np.arange(len(hertz) + 1.0)
         inside = np.minimum(np.maximum(line, low), high)
         fraction = inside[..., 1:] - inside[..., :-1]
         mean = np.add.reduce(fraction * densities[..., None, :], axis=-1) / (high - low)[..., 0]
@@ -215,29 +229,12 @@ class SpatialBandPower(WelchPower):
         return np.log(mean * speed[..., 0] + FLOOR)
 
 
-@lru_cache(maxsize=64)
-def _numbers(count: int) -> Array:
-    numbers = np.arange(count, dtype=np.float64)
-    numbers.flags.writeable = False
-    return numbers
-
-
-@lru_cache(maxsize=64)
-def _edges_1_m(feature: SpatialBandPower) -> Array:
-    """Return the edges of the bands in waves per metre, (bands + 1, 1)."""
-    edges: Array = np.asarray(
-        np.geomspace(1.0 / feature.longest_m, 1.0 / feature.shortest_m, feature.bands + 1), dtype=np.float64
-    )[:, None]
-    edges.flags.writeable = False
-    return edges
-
-
 # --------------------
 # Power in bands of spatial frequency: the mean over the channels.
 
 
 @dataclass(frozen=True)
-class MeanSpatialBands(Feature):
+class MeanSpatialBands(OctaveBands, Feature):
     """Mean over the channels of the log mean density in bands of waves per metre, f / speed; longest waves first.
 
     Bands are equally wide in octaves, over the whole window: a grating of pitch λ is in the band of 1/λ whatever
@@ -266,23 +263,6 @@ class MeanSpatialBands(Feature):
     )
     normalised: bool = param(True, 'Subtracts the mean over the bands, which depends mainly on force and speed.')
     floor: float = floor_param('Spatial power density', 'unit² m', 1e-7)
-
-    def __post_init__(self) -> None:
-        if not self.shortest_m < self.longest_m:
-            raise InvalidParameter(
-                f'spatial bands have waves from {self.shortest_m} m to {self.longest_m} m; the longest must be longer'
-            )
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Number of the band, from 1."""
-        return tuple(str(band + 1) for band in range(self.bands))
-
-    @property
-    def edges_per_m(self) -> Array:
-        """The edges of the bands, waves per metre, (bands + 1,)."""
-        edges = np.geomspace(1.0 / self.longest_m, 1.0 / self.shortest_m, self.bands + 1)
-        return np.asarray(edges, dtype=np.float64)
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the mean over the channels of log(mean density + floor) of each band."""
