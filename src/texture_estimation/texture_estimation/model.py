@@ -639,7 +639,7 @@ def load_model(path: str | Path) -> TextureModel:
         common = common_parts(tree)
         correction = read_correction(target)
         if correction is not None:
-            recipe = replace(recipe, feature_set=replace(recipe.feature_set, correction=correction, _layouts={}))
+            recipe = replace(recipe, feature_set=replace(recipe.feature_set, correction=correction))
             common['feature_set'] += f'{CORRECTED}{correction.fingerprint}'
         model = TextureModel(
             **common,

@@ -192,7 +192,9 @@ class FeatureSet:
     windows: WindowParams
     inputs: tuple[InputFeatures, ...]
     correction: Correction | None = None  # of another finger than that of the training
-    _layouts: dict[InputLayout, tuple[tuple[str, ...], str]] = field(default_factory=dict, repr=False, compare=False)
+    _layouts: dict[InputLayout, tuple[tuple[str, ...], str]] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     @classmethod
     def load(cls, name_or_path: str) -> FeatureSet:
@@ -207,7 +209,7 @@ class FeatureSet:
         feature_set = cls.from_mapping(recipe, f"recipe '{name_or_path}'")
         if not name_or_path.endswith(('.json', '.npz')):
             return feature_set
-        return dataclasses.replace(feature_set, correction=read_correction(name_or_path), _layouts={})
+        return dataclasses.replace(feature_set, correction=read_correction(name_or_path))
 
     @classmethod
     def from_mapping(cls, recipe: Mapping[str, Any], where: str = 'recipe') -> FeatureSet:

@@ -63,7 +63,7 @@ class WindowBatch:
     joined: tuple[WindowBatch, ...] = ()
     channels: tuple[str, ...] = ()
     tangential_force_n: Array = field(default_factory=lambda: np.array(np.nan))
-    _memo: dict[Hashable, Any] = field(default_factory=dict, repr=False)
+    _memo: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False)  # none of what it replaces
 
     def __post_init__(self) -> None:
         if self.samples.ndim < 2 or 0 in self.samples.shape[-2:]:
