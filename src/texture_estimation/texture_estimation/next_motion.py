@@ -109,11 +109,12 @@ class NextTouchModel:
 
     def update(self, log_prior: Array, motion: SlideMotion, values: Array) -> Array:
         """Return the log-posterior (n_textures,) after a slide with mean features (n_features,)."""
-        return log_softmax(log_prior + log_likelihoods(values @ self.projection, self._means(motion)))
+        means = self.means[self.motions.index(motion)]
+        return log_softmax(log_prior + log_likelihoods(values @ self.projection, means))
 
     def information(self, log_posterior: Array, motion: SlideMotion) -> float:
         """Return the information in nats that a slide is expected to give, by its lower bound in closed form."""
-        return least_information(self._means(motion), log_softmax(log_posterior))
+        return least_information(self.means[self.motions.index(motion)], log_softmax(log_posterior))
 
     def best_motion(self, log_posterior: Array, motions: Sequence[SlideMotion]) -> NextTouch:
         """Return the motion with the largest expected information gain; of equal ones the shortest."""
@@ -126,9 +127,6 @@ class NextTouchModel:
         for motion in self.motions:
             if np.isnan(self.update(self.uniform_log_prior, motion, values)).any():
                 raise InvalidData(f'what textures look like under {motion} is not finite')
-
-    def _means(self, motion: SlideMotion) -> Array:
-        return np.asarray(self.means[self.motions.index(motion)])
 
 
 def slide_values(vectors: Sequence[FeatureVector], feature_set: str) -> Array:

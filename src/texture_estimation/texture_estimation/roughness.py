@@ -51,16 +51,6 @@ def graded_columns(names: Sequence[str]) -> NDArray[np.intp]:
     return np.flatnonzero([name.split('/')[1:2] not in ([STICK_SLIP], [LEVEL]) for name in names])
 
 
-def limits_of(names: Sequence[str], values: Array) -> dict[str, float]:
-    """Return the largest STICK_SLIP and the least LEVEL to accept, from training windows (n, n_features)."""
-    limits = {}
-    if (columns := checked_columns(names, STICK_SLIP)).size:
-        limits[STICK_SLIP] = float(values[:, columns].max()) + STICK_SLIP_MARGIN
-    if (columns := checked_columns(names, LEVEL)).size:
-        limits[LEVEL] = float(values[:, columns].max(axis=1).min()) - QUIET_MARGIN
-    return limits
-
-
 # --------------------
 # Protocol of roughness regressors: parameters that fit graded windows and export a predictor.
 
@@ -555,6 +545,11 @@ def train_grades(recipe: RoughnessRecipe, examples: LabelledFeatures, grades: Gr
         calibration, facts = calibrate(
             *hold_out(recipe.regressor, values, true, codes, recipe.training.folds), true, codes
         )
+    limits = {}
+    if (of_stick_slip := checked_columns(examples.names, STICK_SLIP)).size:
+        limits[STICK_SLIP] = float(examples.values[:, of_stick_slip].max()) + STICK_SLIP_MARGIN
+    if (of_level := checked_columns(examples.names, LEVEL)).size:
+        limits[LEVEL] = float(examples.values[:, of_level].max(axis=1).min()) - QUIET_MARGIN
     return RoughnessModel(
         name=name or recipe.name,
         names=examples.names,
@@ -562,7 +557,7 @@ def train_grades(recipe: RoughnessRecipe, examples: LabelledFeatures, grades: Gr
         recipe=recipe,
         parameters=recipe.regressor.fit(values, true, codes),
         calibration=calibration,
-        limits=limits_of(examples.names, examples.values),
+        limits=limits,
         grades=table,
         training={
             'windows': len(codes),

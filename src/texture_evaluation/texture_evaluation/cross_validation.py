@@ -343,7 +343,8 @@ def compare(first: CrossValidation, second: CrossValidation) -> PairedComparison
     -----
     Sources: McNemar 1947, the exact form by the binomial distribution; Efron & Tibshirani 1993, chapter 13.
     """
-    slides = sorted(_tested(first) & _tested(second))
+    one, other = ({name for fold in result.folds for name in fold.results} for result in (first, second))
+    slides = sorted(one & other)
     if not slides:
         raise InvalidData(f"no slide was tested by '{first.recipe}' and by '{second.recipe}'; use the same split")
     right, windows = (
@@ -384,10 +385,6 @@ def mcnemar(only_first: int, only_second: int) -> float:
     """Return the exact two-sided p value of the McNemar (sign) test, 1 if the two never differ."""
     differing = only_first + only_second
     return float(binomtest(only_first, differing).pvalue) if differing else 1.0
-
-
-def _tested(result: CrossValidation) -> set[str]:
-    return {name for fold in result.folds for name in fold.results}
 
 
 def _counts(result: CrossValidation, slides: Sequence[str], *, of_windows: bool) -> Array:

@@ -158,7 +158,8 @@ class InputFeatures:
         options: dict[str, Any] = {'stretch_to_m_s': stretches[0]} if stretches else {}
         if self.tare:
             options['tare'] = self.tare
-        return {**options, 'features': [{name: _parameters(feature)} for name, feature in self.features]}
+        plain = [(name, one.feature if isinstance(one, Stretched) else one) for name, one in self.features]
+        return {**options, 'features': [{name: dataclasses.asdict(one)} for name, one in plain]}  # type: ignore[call-overload]
 
 
 @dataclass(frozen=True)
@@ -434,12 +435,6 @@ def _layout(inputs: Sequence[Window]) -> InputLayout:
     return tuple((item.rate_hz, item.channels) for item in inputs)
 
 
-def _parameters(feature: Feature) -> dict[str, Any]:
-    if isinstance(feature, Stretched):
-        feature = feature.feature
-    return dataclasses.asdict(feature)  # type: ignore[call-overload]
-
-
 # --------------------
 # Report in which part two fingerprints of feature sets differ.
 
@@ -686,6 +681,9 @@ class LabelledFeatures:
             raise ModelMismatch(
                 f'the windows are described in different ways: {"; ".join(fingerprints)}; use those of one kind'
             )
+        running: defaultdict[str, RunningConditions] = defaultdict(RunningConditions)
+        for vector in used:
+            running[vector.exploration_id].update(vector)
         return cls(
             values=np.stack([vector.values for vector in used]),
             labels=np.array([surfaces[vector.exploration_id] for vector in used]),
@@ -695,12 +693,5 @@ class LabelledFeatures:
             window_s=used[0].window_s,
             hop_s=used[0].hop_s,
             start_ns=np.array([vector.start_ns for vector in used], dtype=np.int64),
-            conditions=_conditions(used),
+            conditions={exploration_id: conditions.get() for exploration_id, conditions in running.items()},
         )
-
-
-def _conditions(vectors: Iterable[FeatureVector]) -> Mapping[str, SlideConditions]:
-    running: defaultdict[str, RunningConditions] = defaultdict(RunningConditions)
-    for vector in vectors:
-        running[vector.exploration_id].update(vector)
-    return {exploration_id: conditions.get() for exploration_id, conditions in running.items()}

@@ -310,8 +310,20 @@ class SampleBuffer:
     def append(self, signal: TactileSignal) -> int:
         """Append a batch; return how many samples were lost before it."""
         lost = signal.first_sample - self.next_sample
-        self._forget(signal.first_sample - self._keep)
-        self._make_room(signal.next_sample)
+        # Forget old samples; those already lost by then are not stored at all.
+        before = signal.first_sample - self._keep
+        if before > self.first_sample:
+            self.first_sample = before
+            self.next_sample = max(self.next_sample, before)
+            while self._marks and self._marks[0][0] < before:
+                self._marks.popleft()
+        # Make room for the new ones.
+        if signal.next_sample - self._origin > len(self._rows):
+            kept = self._rows[self.first_sample - self._origin : self.next_sample - self._origin]
+            needed = 2 * (signal.next_sample - self.first_sample)
+            rows = self._rows if needed <= len(self._rows) else np.empty((needed, len(self.channels)), dtype=np.float32)
+            rows[: len(kept)] = kept  # numpy copies overlapping memory correctly
+            self._rows, self._origin = rows, self.first_sample
         row = signal.first_sample - self._origin
         self._rows[self.next_sample - self._origin : row] = np.nan
         self._rows[row : row + len(signal.samples)] = signal.samples
@@ -340,24 +352,6 @@ class SampleBuffer:
         """Return a copy of samples that are kept, (count, n_channels) float64."""
         row = first_sample - self._origin
         return self._rows[row : row + count].astype(np.float64)
-
-    def _forget(self, before: int) -> None:
-        """Forget samples with an index below `before`; those already lost by then are not stored at all."""
-        if before <= self.first_sample:
-            return
-        self.first_sample = before
-        self.next_sample = max(self.next_sample, before)
-        while self._marks and self._marks[0][0] < before:
-            self._marks.popleft()
-
-    def _make_room(self, until: int) -> None:
-        if until - self._origin <= len(self._rows):
-            return
-        kept = self._rows[self.first_sample - self._origin : self.next_sample - self._origin]
-        needed = 2 * (until - self.first_sample)
-        rows = self._rows if needed <= len(self._rows) else np.empty((needed, len(self.channels)), dtype=np.float32)
-        rows[: len(kept)] = kept  # numpy copies overlapping memory correctly
-        self._rows, self._origin = rows, self.first_sample
 
 
 class BufferedStream:
@@ -458,7 +452,11 @@ class SlideCoverage:
                 return False
             start = before if stamp - before <= LINK_NS and not self._withdrawn else stamp
         self._promising |= state.steady_s > 0
-        self._cover(start, stamp + round(min(max(0.0, state.steady_s), MAX_STEADY_S) * NANOSECONDS))
+        end = stamp + round(min(max(0.0, state.steady_s), MAX_STEADY_S) * NANOSECONDS)
+        if self._intervals and start <= self._intervals[-1][1]:
+            self._intervals[-1][1] = max(self._intervals[-1][1], end)
+        else:
+            self._intervals.append([start, end])
         self._withdrawn = self._promising and not state.steady_s > 0
         far = (
             state.force_n < LEAST_FORCE * self._force.value
@@ -496,12 +494,6 @@ class SlideCoverage:
         count = min(count, left)
         self._next_ns += count * self._hop_ns
         return count
-
-    def _cover(self, start: int, end: int) -> None:
-        if self._intervals and start <= self._intervals[-1][1]:
-            self._intervals[-1][1] = max(self._intervals[-1][1], end)
-        else:
-            self._intervals.append([start, end])
 
     def _span(self, start: int, end: int) -> CoveredSpan:
         states = self._states
