@@ -295,6 +295,11 @@ class ClassDistance:
         """Projection by columns: so a product with one slide is faster."""
         return np.asfortranarray(self.projection)
 
+    @cached_property
+    def _nearer(self) -> Array:
+        """What the square along each direction counts less about the centre than about a slide, (n_directions,)."""
+        return 1.0 - self.weights
+
     def score(self, mean: Array, code: int) -> Array:
         """Return the score, (...), of mean features (..., n_features) for a class; infinite without its slides."""
         found = self._of_class.get(code)
@@ -309,7 +314,7 @@ class ClassDistance:
             halves.partition(NEAREST - 1)
             halves = halves[..., :NEAREST]
         nearest: Array = np.add.reduce(halves, axis=-1) * (2.0 / halves.shape[-1])
-        nearest += (projected * projected) @ (1.0 - self.weights)
+        nearest += (projected * projected) @ self._nearer
         return nearest
 
     def with_slides(self, means: Array, classes: Codes) -> ClassDistance:
