@@ -50,7 +50,7 @@ def recipe_of(name: str) -> Recipe:
     windows = replace(recipe.feature_set.windows, length_s=changed.get('length_s', recipe.feature_set.windows.length_s))
     learner: Any = recipe.learner
     passes = {'passes': changed['passes']} if 'passes' in changed else {}
-    feature_set = replace(recipe.feature_set, windows=windows, _layouts={})
+    feature_set = replace(recipe.feature_set, windows=windows)
     return replace(recipe, feature_set=feature_set, learner=replace(learner, **passes))
 
 

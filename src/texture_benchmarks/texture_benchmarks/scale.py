@@ -182,7 +182,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     """
     recipe = load_recipe(RECIPE)
     recipe = replace(recipe, augmentation=replace(recipe.augmentation, copies=0))
-    feature_set = replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
+    feature_set = replace(recipe.feature_set, windows=recipe.training_windows)
     some = (QUICK_SLIDES, QUICK_MATERIALS) if options.quick else ()
     with imported(options, 'biotac20', *some) as bags:
         spread = FeatureSpread.of(SlideDataset.from_bags(bags, topics=feature_set.topics).features(feature_set))

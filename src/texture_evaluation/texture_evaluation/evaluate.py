@@ -59,25 +59,18 @@ class EvaluationReport:
 
     def as_json(self) -> dict[str, Any]:
         """Return the figures; null where there is no slide."""
-        nothing = {'accuracy': None, 'mean_s': None}
         median, p99 = np.percentile(self.latency_us, (50, 99))
         return {
             'shift': self.shift,
             'trained_on': list(self.trained_on),
             **figures(self.known, self.clusters),
-            'early': metrics.early_decision(self.known) if self.known else nothing,
+            'early': metrics.early_decision(self.known),
             'calibration_error': metrics.calibration_error(self.known),
-            'candidates': metrics.candidates(self.known),
-            'falsely_rejected': metrics.falsely_rejected(self.known),
             'unknown_accepted': metrics.unknown_accepted(self.unknown),
             'labels': list(self.labels),
             'tested': self.tested,
             'confusion': self.confusion.tolist(),
             'latency_us': {'median': float(median), 'p99': float(p99)},
-            'unclassified': {
-                'windows': metrics.unclassified_windows(self.known) if self.known else None,
-                'at_s': metrics.unclassified_at_times(self.known),
-            },
             'accepted_wrong': metrics.accepted_wrong([*self.known, *self.unknown]),
             'rejected': metrics.rejected([*self.known, *self.unknown]),
             'rejections_of_untrained': metrics.rejections(self.unknown),

@@ -50,14 +50,9 @@ def train_from_bags(
     with task(f"fit '{plan.name}' to {len(examples.y)} windows"):
         model = train(plan, examples, _name(out, plan.name))
     faults = dataset.tare_faults(plan.feature_set)
-    most = max(
-        sum(len(batch.samples) for slide in dataset for batch in slide.signals[topic])
-        for topic in plan.feature_set.topics
-    )
     trained_on = {
         'sessions': sorted({slide.session for slide in dataset}),
         'slide_digests': sorted(map(slide_digest, dataset)),
-        'samples': most,
     }
     model = replace(model, training={**model.training, **trained_on, **({'tare': faults} if faults else {})})
     if out is not None:
@@ -85,7 +80,7 @@ def train_grades_from_bags(
 
 def training_examples(recipe: Recipe, dataset: SlideDataset) -> LabelledFeatures:
     """Return the windows of labelled slides as the training of a recipe needs them, with its augmentation."""
-    windows = replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
+    windows = replace(recipe.feature_set, windows=recipe.training_windows)
     distances_m = recipe.training.distances_m(recipe.feature_set.windows.length_s)
     return dataset.features(windows, recipe.augmentation, distances_m)
 
