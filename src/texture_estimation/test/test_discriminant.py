@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from texture_core.config import folder
 from texture_estimation.domain import ONE_PLACE
 from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.evidence_rules import SoftVote, followed
@@ -15,6 +16,7 @@ from texture_estimation.recipe import Recipe
 from texture_estimation.training import held_out_parts, in_places, train
 from texture_features.feature_set import LabelledFeatures, SlideConditions
 
+RELEASED = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
 CONTENT = {
     'windows': {'length_s': 0.5, 'hop_s': 0.25},
     'inputs': {'signal': {'features': ['mean']}},

@@ -43,6 +43,15 @@ def test_two_overlapping_clouds_are_separated_as_well_as_possible_and_no_better_
     assert np.exp(fitted.held_out.max(axis=1)).mean() == pytest.approx(right, abs=0.03)
 
 
+def test_a_feature_that_was_constant_is_ignored_and_units_do_not_matter(examples):
+    codes, groups = (np.unique(column, return_inverse=True)[1] for column in (examples.labels, examples.groups))
+    values = np.column_stack([examples.values, np.full(len(codes), 7.0)])
+    predict = Mlp.predictor(Mlp(epochs=5).fit(values, codes, groups).parameters)
+    assert predict(values + np.eye(values.shape[1])[-1] * 1e9) == pytest.approx(predict(values), abs=1e-6)
+    in_micro = Mlp.predictor(Mlp(epochs=5).fit(values * 1e6, codes, groups).parameters)
+    assert log_softmax(in_micro(values * 1e6)) == pytest.approx(log_softmax(predict(values)), abs=1e-3)
+
+
 @pytest.mark.filterwarnings('ignore::sklearn.exceptions.ConvergenceWarning')
 def test_the_array_form_decides_every_window_as_scikit_learn_with_the_same_weights(make_examples):
     examples, fresh = make_examples(spread=2.0), make_examples(seed=5, spread=3.0).values

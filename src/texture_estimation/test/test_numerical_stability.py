@@ -24,12 +24,22 @@ FLOORED = frozenset({'any-speed'})
 RATES_HZ = {'signal': 1000.0, 'signal_static': 100.0}
 
 
+def nearly_dependent(values):
+    """Six features of which any two are the same but for 1e-9: a covariance of rank one within numerical precision."""
+    return values[:, :1] + 1e-9 * values
+
+
+def of_many_units(values):
+    """The same features from micro to mega."""
+    return values * np.geomspace(1e-6, 1e6, values.shape[1])
+
+
 DIFFICULT = {
     'scaled by 1e6': lambda values: 1e6 * values,
     'scaled by 1e-6': lambda values: 1e-6 * values,
-    'in many units': lambda values: values * np.geomspace(1e-6, 1e6, values.shape[1]),
+    'in many units': of_many_units,
     'duplicated': lambda values: np.tile(values, (1, 2)),
-    'a covariance of rank one but for 1e-9': lambda values: values[:, :1] + 1e-9 * values,
+    'nearly dependent': nearly_dependent,
     'far from zero': lambda values: 1e6 + values,
 }
 
@@ -57,6 +67,11 @@ def test_log_probabilities_are_finite_and_add_up(name, change, slides, make_exam
         answers = model.predict_log_proba(values)
         assert np.isfinite(answers).all()
         np.testing.assert_allclose(np.exp(answers).sum(axis=1), 1.0)
+
+
+def test_one_window_of_each_surface_is_enough_to_answer(name, make_examples):
+    examples = make_examples(slides=1, windows=1)
+    assert np.isfinite(learn(name, examples).predict_log_proba(examples.values)).all()
 
 
 @pytest.mark.filterwarnings('error::RuntimeWarning')

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from texture_core.config import folder, shipped
-from texture_core.errors import TextureError
+from texture_core.errors import InvalidParameter, TextureError
 from texture_core.types import Array
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.roughness import RoughnessRecipe, load_roughness_recipe
@@ -33,27 +33,28 @@ def test_training_windows_have_the_hop_of_the_training():
 
 
 @pytest.mark.parametrize(
-    ('kind', 'more', 'sentence'),
+    ('more', 'sentence'),
     [
-        (Recipe, {'learnr': 'mlp'}, "did you mean 'learner'"),
-        (Recipe, {'learner': 'mpl'}, "did you mean 'mlp'"),
-        (Recipe, {'learner': {'mlp': {'noise': -1}}}, "parameter 'noise'"),
-        (Recipe, {'learner': ['mlp']}, 'is written'),
-        (Recipe, {'evidence': 'vote'}, 'soft_vote'),
-        (Recipe, {'training': {'hop_s': 'x'}}, 'a number is needed'),
-        (Recipe, {'training': 3}, 'a mapping'),
-        (RoughnessRecipe, {'learner': 'mlp'}, "no key 'learner'"),
-        (RoughnessRecipe, {'regressor': 'gaussian_proces'}, "did you mean 'gaussian"),
-        (RoughnessRecipe, {'training': {'fold': 5}}, "did you mean 'folds'"),
-        # What decides on textures is no parameter of a roughness recipe.
-        (RoughnessRecipe, {'training': {'false_rejection_rate': 0.1}}, 'false_rejection_rate'),
+        ({'learnr': 'mlp'}, "did you mean 'learner'"),
+        ({'learner': 'mpl'}, "did you mean 'mlp'"),
+        ({'learner': {'mlp': {'noise': -1}}}, "parameter 'noise'"),
+        ({'learner': ['mlp']}, 'is written'),
+        ({'evidence': 'vote'}, 'soft_vote'),
+        ({'training': {'hop_s': 'x'}}, 'a number is needed'),
+        ({'training': 3}, 'a mapping'),
     ],
 )
-def test_a_wrong_recipe_gets_one_sentence_that_states_where(kind, more, sentence):
+def test_a_wrong_recipe_gets_one_sentence_that_states_where(more, sentence):
     with pytest.raises(TextureError, match=sentence) as caught:
-        kind.from_mapping({**INPUTS, **more}, 'mine')
+        Recipe.from_mapping({**INPUTS, **more}, 'mine')
     assert "recipe 'mine'" in str(caught.value)
     assert '\n' not in str(caught.value)
+
+
+def test_what_rules_decisions_about_textures_is_no_parameter_of_a_roughness_recipe():
+    assert RoughnessRecipe.from_mapping({**INPUTS, 'training': {'folds': 5}}, 'mine').training.folds == 5
+    with pytest.raises(InvalidParameter, match='false_rejection_rate'):
+        RoughnessRecipe.from_mapping({**INPUTS, 'training': {'false_rejection_rate': 0.1}}, 'mine')
 
 
 def test_augmentation_is_a_section_of_training_that_only_a_network_takes():

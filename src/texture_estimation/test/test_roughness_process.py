@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData, TextureError
-from texture_estimation.roughness import GaussianProcess, read_grades
+from texture_estimation.roughness import GaussianProcess, RoughnessRecipe, read_grades
+
+INPUTS = {'inputs': {'signal': {'features': ['hjorth']}}}
 
 
 def test_far_from_all_textures_the_process_is_less_sure(graded_windows) -> None:
@@ -29,6 +31,20 @@ def test_more_windows_of_the_same_textures_make_the_process_no_surer(graded_wind
 def test_a_single_texture_cannot_be_trained_on(graded_windows) -> None:
     with pytest.raises(InvalidData, match='one texture'):
         GaussianProcess().fit(*graded_windows(n_textures=1))
+
+
+@pytest.mark.parametrize(
+    ('more', 'sentence'),
+    [
+        ({'learner': 'mlp'}, "no key 'learner'"),
+        ({'regressor': 'gaussian_proces'}, "did you mean 'gaussian"),
+        ({'training': {'fold': 5}}, "did you mean 'folds'"),
+    ],
+)
+def test_a_wrong_recipe_gets_one_sentence_that_states_where(more, sentence) -> None:
+    with pytest.raises(TextureError, match=sentence) as caught:
+        RoughnessRecipe.from_mapping({**INPUTS, **more}, 'mine')
+    assert "roughness recipe 'mine'" in str(caught.value)
 
 
 def test_grades_are_read_with_their_split(tmp_path) -> None:

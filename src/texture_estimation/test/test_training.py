@@ -22,10 +22,22 @@ def accuracy(model, examples):
     return (np.array(model.labels)[best] == examples.labels).mean()
 
 
+def test_a_model_knows_surfaces_it_was_shown(model, make_examples):
+    assert accuracy(model, make_examples(seed=1)) > 0.9
+    assert model.labels == ('cork', 'felt', 'slate', 'wood')
+
+
 def test_the_same_examples_make_the_same_model(model, examples):
     again = train(RECIPE, examples)
     np.testing.assert_array_equal(again.predict_log_proba(examples.values), model.predict_log_proba(examples.values))
     assert again.tempering_exponent == model.tempering_exponent
+
+
+def test_confidence_is_not_far_from_how_often_it_is_right(make_examples):
+    model = train(RECIPE, make_examples(spread=2.5, slides=10))
+    fresh = make_examples(seed=3, spread=2.5, slides=10)
+    confidence = np.exp(model.predict_log_proba(fresh.values)).max(axis=1).mean()
+    assert confidence == pytest.approx(accuracy(model, fresh), abs=0.08)
 
 
 @pytest.mark.parametrize(
@@ -61,6 +73,20 @@ def test_vectors_are_gathered_with_their_surfaces():
     assert examples.values.tolist() == [[0.0], [1.0], [4.0], [5.0]]
     with pytest.raises(InvalidData, match='no window of a labelled surface'):
         LabelledFeatures.from_vectors(vectors, {})
+
+
+def test_a_slide_of_a_class_that_was_left_out_is_unknown_at_every_estimate(make_examples, estimates_of):
+    labels = ('cork', 'felt', 'wood', 'slate', 'glass', 'paper')
+    examples = make_examples(labels=labels, slides=12, features=8, seed=3)
+    recipe = dataclasses.replace(RECIPE, training=dataclasses.replace(RECIPE.training, false_rejection_rate=0.05))
+    model = train(recipe, examples.take(examples.labels != 'glass'))
+    new = make_examples(labels=labels, slides=12, features=8, seed=4)
+    known = {
+        label: [e.accepted for n in range(12) for e in estimates_of(model, new.values[new.groups == f'{label}/{n}'])]
+        for label in labels
+    }
+    assert np.mean(known.pop('glass')) < 0.2
+    assert np.mean(list(known.values())) > 0.9
 
 
 def augmented(examples, response, copies=2, shift=0.0):

@@ -49,6 +49,17 @@ def test_the_training_reports_when_its_slides_are_too_few_to_decide(model: Textu
     assert 'too little training: 6 slides could be held out' in lines[2]
 
 
+@pytest.mark.parametrize(
+    ('slides', 'expected'),
+    [({'cork': 4, 'felt': 1}, 'few slides of felt: 1, of others up to 4'), ({'cork': 4, 'felt': 3}, '')],
+)
+def test_a_surface_with_far_fewer_slides_than_others_is_named(model: TextureModel, slides: dict, expected: str) -> None:
+    domain = replace(model.acceptance.domain, slides=slides)
+    uneven = replace(model, acceptance=replace(model.acceptance, domain=domain))
+    found = [line for line in summary(uneven, Path('model.npz')) if line.startswith('few slides')]
+    assert [line.partition(';')[0] for line in found] == ([expected] if expected else [])
+
+
 def test_a_training_with_one_slide_of_a_label_is_reported_as_too_confident(simulated: Path) -> None:
     lines = summary(train_from_bags('default', [simulated], '1'), Path('model.npz'))
     assert lines[2] == 'this accuracy is of held-out windows, as a label has a single slide: too confident'
@@ -74,15 +85,21 @@ def noise(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / 'bags'
 
 
-def test_a_recipe_that_does_not_fit_the_data_is_named(noise: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ('hop_s', 'warning'),
+    [
+        (0.1, r'\d+\.\d % accuracy of held-out windows is not above chance, 50\.0 % of 2'),
+        (0.005, 'windows overlap more than'),
+    ],
+)
+def test_a_recipe_that_does_not_fit_the_data_is_named(noise: Path, tmp_path: Path, hop_s: float, warning: str) -> None:
     (tmp_path / 'mine.yaml').write_text(
-        'windows: {length_s: 0.5, hop_s: 0.1}\ntraining: {hop_s: 0.1}\n'
+        f'windows: {{length_s: 0.5, hop_s: 0.1}}\ntraining: {{hop_s: {hop_s}}}\n'
         'inputs: {signal: {features: [mean, hjorth]}}\n'
         "learner: {sklearn: {estimator: 'sklearn.naive_bayes:GaussianNB'}}\n"
     )
     lines = summary(train_from_bags(str(tmp_path / 'mine.yaml'), [noise]), Path('model.npz'))
-    warning = r'warning: \d+\.\d % accuracy of held-out windows is not above chance, 50\.0 % of 2'
-    assert any(re.match(warning, line) for line in lines), lines
+    assert any(re.match(f'warning: .*{warning}', line) for line in lines), lines
 
 
 def test_a_recipe_of_taxels_names_the_streams_that_a_recording_of_vibration_has(noise: Path) -> None:

@@ -59,12 +59,13 @@ class EvaluationReport:
 
     def as_json(self) -> dict[str, Any]:
         """Return the figures; null where there is no slide."""
+        nothing = {'accuracy': None, 'mean_s': None}
         median, p99 = np.percentile(self.latency_us, (50, 99))
         return {
             'shift': self.shift,
             'trained_on': list(self.trained_on),
             **figures(self.known, self.clusters),
-            'early': metrics.early_decision(self.known),
+            'early': metrics.early_decision(self.known) if self.known else nothing,
             'calibration_error': metrics.calibration_error(self.known),
             'unknown_accepted': metrics.unknown_accepted(self.unknown),
             'labels': list(self.labels),

@@ -68,10 +68,8 @@ def unclassified_windows(results: Sequence[SlideResult]) -> float:
     return float(np.mean([not label for result in results for label in result.window_labels]))
 
 
-def early_decision(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
-    """Return accuracy and mean time of decisions taken as soon as the estimate is decided; None without slides."""
-    if not results:
-        return {'accuracy': None, 'mean_s': None}
+def early_decision(results: Sequence[SlideResult]) -> Mapping[str, float]:
+    """Return accuracy and mean time of decisions taken as soon as the estimate is decided."""
     decisions = [(result.surface, result.early()) for result in results]
     return {
         'accuracy': float(np.mean([estimate.label == surface for surface, estimate in decisions])),

@@ -50,9 +50,14 @@ def train_from_bags(
     with task(f"fit '{plan.name}' to {len(examples.y)} windows"):
         model = train(plan, examples, _name(out, plan.name))
     faults = dataset.tare_faults(plan.feature_set)
+    most = max(
+        sum(len(batch.samples) for slide in dataset for batch in slide.signals[topic])
+        for topic in plan.feature_set.topics
+    )
     trained_on = {
         'sessions': sorted({slide.session for slide in dataset}),
         'slide_digests': sorted(map(slide_digest, dataset)),
+        'samples': most,
     }
     model = replace(model, training={**model.training, **trained_on, **({'tare': faults} if faults else {})})
     if out is not None:

@@ -255,6 +255,7 @@ def test_a_skid_stands_out_and_an_even_hum_does_not() -> None:
 
 SPATIAL_RATE_HZ = 400.0
 PITCH_M = 4e-3
+SPEEDS_M_S = (0.02, 0.05, 0.1)
 PLACES_M = np.array([0.0, 1e-3, 5e-3, 9e-3])
 
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
 
 from texture_core.cli import add_slides
@@ -64,6 +65,7 @@ def summary(model: TextureModel, out: Path) -> list[str]:
         f'from {training["slides"]} slides, {training["windows"]} windows of {training["window_s"]:g} s; {held_out}',
         *(f'this accuracy is of {note}' for note in [training['calibration']] if note.endswith('too confident')),
         *_unfit(model),
+        *_uneven(model.acceptance.domain.slides),
         *training.get('tare', []),
         *filter(
             None, [model.acceptance.reason or model.acceptance.decided_reason, model.acceptance.domain.reach_reason]
@@ -74,16 +76,32 @@ def summary(model: TextureModel, out: Path) -> list[str]:
 
 
 def _unfit(model: TextureModel) -> list[str]:
-    """Return a warning where the held-out accuracy is no better than chance: the recipe does not fit the data."""
+    """Return warnings that the recipe does not fit the data: no better than chance, or more windows than samples."""
     training, labels = model.training, len(model.labels)
-    accuracy, chance = training['held_out_window_accuracy'], 1.0 / max(labels, 1)
+    warnings = []
+    chance = 1.0 / max(labels, 1)
     margin = 1.64 * (chance * (1.0 - chance) / max(training['slides'], 1)) ** 0.5
-    if accuracy is None or labels < 2 or accuracy > chance + margin:
+    accuracy = training['held_out_window_accuracy']
+    if accuracy is not None and labels > 1 and accuracy <= chance + margin:
+        warnings.append(
+            f'warning: {100 * accuracy:.1f} % accuracy of held-out windows is not above chance, {100 * chance:.1f} % '
+            f'of {labels} surfaces; use a recipe for this sensor and rate, or check the labels'
+        )
+    if training['windows'] > training.get('samples', training['windows']):
+        warnings.append(
+            f'warning: {training["windows"]} windows overlap more than the {training["samples"]} samples that exist; '
+            'use a recipe with longer hops, or check the rate of the recording'
+        )
+    return warnings
+
+
+def _uneven(slides: Mapping[str, int]) -> list[str]:
+    """Return a line on the labels with the fewest slides, where others have twice as many."""
+    fewest, most = min(slides.values(), default=0), max(slides.values(), default=0)
+    if 2 * fewest > most or not most:
         return []
-    return [
-        f'warning: {100 * accuracy:.1f} % accuracy of held-out windows is not above chance, {100 * chance:.1f} % '
-        f'of {labels} surfaces; use a recipe for this sensor and rate, or check the labels'
-    ]
+    few = ', '.join(label for label, count in slides.items() if count == fewest)
+    return [f'few slides of {few}: {fewest}, of others up to {most}; record equally many of each']
 
 
 def graded_summary(model: RoughnessModel, out: Path) -> list[str]:
