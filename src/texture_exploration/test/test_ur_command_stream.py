@@ -88,9 +88,9 @@ def test_without_a_rise_nothing_is_zeroed():
 class SteppedLink:
     """Worker process and controller of a UR, with its emulated robot, on a stepped clock; `sent` takes the commands."""
 
-    def __init__(self, sent):
+    def __init__(self, sent, **scene):
         self.now_ns, self.wish, self.sent = 1_000_000_000, None, sent
-        self.robot = ur.EmulatedRobot(ur.UrControllerParams(), np.random.default_rng(20))
+        self.robot = ur.EmulatedRobot(ur.UrControllerParams(**scene), np.random.default_rng(20))
         watchdog = Watchdog(self, UrArmParams(), lambda _seconds: None, lambda: self.now_ns * 1e-9)
         self.stream = UrCommandStream(self, UrArmParams(), watchdog)
         self.arm = UrArm()
@@ -154,6 +154,28 @@ def test_a_slide_commands_force_and_speed_by_turns_and_ends_with_the_finger_lift
     assert pressed[1::2] == ['speedL'] * len(pressed[1::2])
     assert names.index('zeroFtSensor') < names.index('forceMode')
     assert link.robot.pressing_n == 0.0
+
+
+@pytest.mark.parametrize('paused_s', [0.15, 0.3])
+def test_an_explorer_that_was_paused_before_a_wall_leads_the_finger_back_from_it(paused_s):
+    link = SteppedLink([], wall_m=0.02, stop_force_n=1e5)
+    limits = SafetyLimits(state_timeout_s=1.0)
+    explorer = Explorer(link.arm, TouchParams(), limits, lambda _state: None, lambda: link.now_ns)
+    pauses, peak_n = [paused_s], 0.0
+
+    def pace():
+        nonlocal peak_n
+        link.pace()
+        if link.arm.state().position[0] > 0.018 and pauses:  # the newest command holds meanwhile
+            for _ in range(round(pauses.pop() / 0.01)):
+                link.pace()
+        peak_n = max(peak_n, np.linalg.norm(link.robot.force))
+
+    request = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=5.0, distance_m=0.06)
+    outcome = explorer._prepare('one', request).run(pace)
+    assert peak_n > 100.0
+    assert outcome.lifted, outcome.message
+    assert link.arm.state().force_size_n < 0.5
 
 
 def test_a_finger_that_turns_back_out_of_force_control_is_led_back_before_anything_is_waited_for():

@@ -237,8 +237,6 @@ class ForceGuard:
         """Return the command; or, after an abort, the way back as long as the finger is blocked."""
         now_ns, size_n = arm.time_ns, arm.force_size_n
         held = bool(self._limits.force_violation(arm) or self._limits.friction_violation(arm))
-        while self._way and now_ns - self._way[0][0] > WAY_S * 1e9:
-            self._way.popleft()
         if aborted and held and self._way:
             # A force that did not grow on the way, as that of a broken sensor, does not end on the way back.
             if size_n - min(before_n for _, _, before_n in self._way) > self._limits.tangential_floor_n:
@@ -248,6 +246,9 @@ class ForceGuard:
         if self._back is None:
             if not self._came_back:
                 self._way.append((now_ns, command, size_n))
+                # Counted from the newest command: after a pause of this process it is the one that led to the obstacle.
+                while now_ns - self._way[0][0] > WAY_S * 1e9:
+                    self._way.popleft()
             return command
         # Half of the allowance: what is left then is no more than noise.
         self._largest_n = max(self._largest_n, size_n)
