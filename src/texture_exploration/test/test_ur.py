@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_core.errors import DeviceError
+from texture_core.errors import CommandRefused, DeviceError
 from texture_core.types import ExplorationRequest, FingerReceiver, Phase
 from texture_exploration.arms import ur
 from texture_exploration.arms.arm import ArmCommand
@@ -130,6 +130,14 @@ def keep(arm, command, condition):
         return condition()
 
     return wait_for(step)
+
+
+def zero(arm):
+    """Rise in free air and rest, until the force sensor is zeroed."""
+    before, height_m = arm.counts.get('zeroed', 0), arm.state().position[2]
+    keep(arm, ArmCommand(normal_m_s=0.02), lambda: arm.state().position[2] > height_m + 0.008)
+    arm.stop()
+    wait_for(lambda: arm.counts.get('zeroed', 0) > before)
 
 
 def faulty(arm):
@@ -255,9 +263,7 @@ def test_commands_and_states_are_in_the_frame_of_the_surface(emulator):
 
 
 def test_the_force_sensor_is_zeroed_in_the_air_but_not_in_contact(arm, emulator):
-    keep(arm, ArmCommand(normal_m_s=0.02), lambda: arm.state().position[2] > 0.008)
-    arm.stop()
-    wait_for(emulator.rests)
+    zero(arm)
     keep(arm, ArmCommand(force_n=2.0), lambda: abs(emulator.fingers[-1].force_n - 2.0) < 0.05)
     arm.stop()
     wait_for(emulator.rests)
@@ -473,6 +479,7 @@ def gap(arm, emulator):
 
 def test_gaps_between_commands_while_pressing_do_not_zero_the_force_away():
     with bench_at('127.0.0.70', surface_z_m=0.1 + ABOVE_PLANE_M) as emulator, connected(emulator.ip) as arm:
+        zero(arm)
         forces = [press(arm, emulator)]
         for _ in range(3):
             gap(arm, emulator)
@@ -481,12 +488,16 @@ def test_gaps_between_commands_while_pressing_do_not_zero_the_force_away():
         assert max(finger.force_n for finger in emulator.fingers) < 4.5
 
 
-def test_who_connects_in_contact_lifts_before_the_force_sensor_is_zeroed():
+def test_who_connects_in_contact_may_not_press_before_the_force_sensor_is_zeroed_in_free_air():
     with bench_at('127.0.0.71', surface_z_m=0.1 + ABOVE_PLANE_M) as emulator:
         with connected(emulator.ip) as arm:
+            zero(arm)
             press(arm, emulator)
         assert emulator.force_n > 2.0
         with connected(emulator.ip) as arm:
+            with pytest.raises(CommandRefused, match='the force sensor is not zeroed'):
+                arm.command(PRESSING)
+            zero(arm)
             assert press(arm, emulator) == pytest.approx(3.0, abs=0.3)
             assert min(finger.force_n for finger in list(emulator.fingers)) == 0.0
         assert max(finger.force_n for finger in emulator.fingers) < 4.5
@@ -494,10 +505,12 @@ def test_who_connects_in_contact_lifts_before_the_force_sensor_is_zeroed():
 
 def test_after_a_protective_stop_in_contact_the_same_force_is_pressed_again():
     with bench_at('127.0.0.72', surface_z_m=0.1 + ABOVE_PLANE_M) as emulator, connected(emulator.ip) as arm:
+        zero(arm)
         press(arm, emulator)
         emulator.controller.ask('emulate protective stop')
         wait_for(lambda: arm.state().fault == 'protective stop')
         arm.recover()
+        zero(arm)
         assert press(arm, emulator) == pytest.approx(3.0, abs=0.3)
 
 
@@ -566,9 +579,7 @@ def late():
 def test_slow_acknowledgements_of_stops_and_zeroing_do_not_trip_the_watchdog(late):
     emulator, arm = late
     for _ in range(2):
-        keep(arm, ArmCommand(normal_m_s=0.02), lambda: emulator.fingers[-1].vz_m_s > 0.01)
-        arm.stop()
-        wait_for(emulator.rests)
+        zero(arm)
         assert press(arm, emulator) == pytest.approx(3.0, abs=0.3)
         arm.stop()
         wait_for(emulator.rests)

@@ -79,10 +79,11 @@ def test_a_zeroing_that_the_controller_did_not_take_is_tried_again_where_the_arm
     assert arm.stream.refused == refusals
 
 
-def test_without_a_rise_nothing_is_zeroed():
+def test_without_a_rise_nothing_is_zeroed_and_nothing_is_pressed():
     arm = Arm()
     arm.cycles(1.0, None)
-    assert (arm.stream.trusted, arm.control.zeroed) == (False, 0)
+    arm.cycles(1.0, RISING._replace(force_n=1.0))
+    assert (arm.stream.trusted, arm.control.zeroed, arm.height_m) == (False, 0, 0.01)
 
 
 class SteppedLink:
@@ -100,7 +101,7 @@ class SteppedLink:
     def report(self):
         robot, stream = self.robot, self.stream
         measured = (tuple(vector[:3].tolist()) for vector in (robot.pose, robot.velocity, robot.force))
-        return UrReport(self.now_ns, *measured, 0.1, 1, True, False, stream.unsteady, stream.trusted, {})
+        return UrReport(self.now_ns, *measured, 0.1, 1, True, False, stream.trusted, {})
 
     def check(self):
         pass

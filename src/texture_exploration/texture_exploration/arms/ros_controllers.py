@@ -19,9 +19,7 @@ from typing import Protocol
 
 from texture_core.errors import DeviceError
 from texture_exploration.arms.arm import (
-    RISE_M_S,
     STANDSTILL,
-    UNSTEADY,
     ArmCommand,
     ArmState,
     CommandedVelocity,
@@ -210,17 +208,18 @@ class RosControllersArm(SurfaceArm):
     def command(self, command: ArmCommand) -> None:
         """Follow a command from the next period on.
 
-        A command with a force lifts the finger first until the force sensor is zeroed, which takes proven free air.
+        The force sensor is zeroed in free air only, at rest after a rise of 3 mm without a change of the force.
 
         Raises
         ------
         CommandRefused
-            If a number is not finite or out of its range; the arm stops.
+            If a number is not finite or out of its range, or a force is wanted before the force sensor was zeroed since
+            the arm was connected, recovered or in a fault; the arm stops.
         DeviceError
             If the arm is not connected.
         """
         self._connected()
-        self._params.check(command, self.stop)
+        self._check(command)
         self._command = (command, self._clock())
 
     def stop(self) -> None:
@@ -448,20 +447,8 @@ class RosControllersArm(SurfaceArm):
         if self._unsafe:  # only a lift is allowed
             up_m_s = 0.0 if command[0].force_n is not None else max(0.0, command[0].normal_m_s)
             return ArmCommand(normal_m_s=up_m_s)
-        return self._lifted_first(command[0])
-
-    def _lifted_first(self, command: ArmCommand) -> ArmCommand | None:
-        """Return the command, or what comes before it as long as the force sensor is not zeroed."""
-        zero, height_m = self._tool.zero, self._state.position[2]
-        if command.force_n is None or zero.zeroed:
-            zero.air.seek(None)
-            return command
-        if zero.air.proven:
-            return None  # at rest it is zeroed
-        if zero.air.seek(height_m):
-            self._lost = UNSTEADY
-            return None
-        return ArmCommand(normal_m_s=RISE_M_S)
+        pressed = command[0].force_n is not None
+        return command[0] if self._tool.zero.zeroed or not pressed else None
 
     def _carry_out(self, topics: ControllerTopics, command: ArmCommand | None, held_s: float) -> None:
         state = self._state

@@ -25,7 +25,6 @@ from texture_core.errors import DeviceError
 from texture_core.types import loopback_address
 from texture_exploration.arms.arm import (
     STANDSTILL,
-    UNSTEADY,
     ArmCommand,
     ArmState,
     ForceReading,
@@ -121,9 +120,9 @@ class UrCommand(NamedTuple):
 class UrReport(NamedTuple):
     """Newest measurement of the controller, in the base frame, and its status.
 
-    `time_ns` is when it arrived, of CLOCK_MONOTONIC. `force_n` is the force of the surroundings on the tool. `unsteady`
-    says that the force sensor could not be zeroed, because the force changed while the finger rose; `zeroed`,
-    that it was, since the arm was connected or recovered. `watchdog_s` is how long the controller's watchdog waits.
+    `time_ns` is when it arrived, of CLOCK_MONOTONIC. `force_n` is the force of the surroundings on the tool; `zeroed`
+    says that its sensor was zeroed since the arm was connected or recovered. `watchdog_s` is how long the controller's
+    watchdog waits.
 
     `counts` are totals since the arm was connected. `late`: gaps of more than 20 ms in what the controller sends.
     `refused`: commands that it did not accept. `zeroed`: zeroings of the force sensor. `slow_acknowledgements`:
@@ -139,7 +138,6 @@ class UrReport(NamedTuple):
     safety_mode: int
     playing: bool
     silent: bool
-    unsteady: bool
     zeroed: bool
     counts: Mapping[str, int]
 
@@ -622,17 +620,17 @@ class UrArm(SurfaceArm):
     def command(self, command: ArmCommand) -> None:
         """Send a command to the worker.
 
-        The force sensor is zeroed in free air only, which a rise of 3 mm without a change of the force proves.
-        As long as it has not been zeroed since the arm was connected or recovered, a command with a force lifts first.
+        The force sensor is zeroed in free air only, at rest after a rise of 3 mm without a change of the force.
 
         Raises
         ------
         CommandRefused
-            If a number is not finite or out of its range; the arm stops.
+            If a number is not finite or out of its range, or a force is wanted before the force sensor was zeroed since
+            the arm was connected or recovered; the arm stops.
         DeviceError
             If the arm cannot be reached.
         """
-        self._params.check(command, self.stop)
+        self._check(command)
         if command == STANDSTILL:
             self.stop()
             return
@@ -700,6 +698,4 @@ class UrArm(SurfaceArm):
             return f'the controller is silent for more than {self._params.silence_s * 1e3:.0f} ms'
         if report.safety_mode in SAFETY_FAULTS:
             return SAFETY_FAULTS[report.safety_mode]
-        if not report.playing:
-            return 'its control program was stopped, by hand or by its watchdog'
-        return UNSTEADY if report.unsteady else ''
+        return '' if report.playing else 'its control program was stopped, by hand or by its watchdog'
