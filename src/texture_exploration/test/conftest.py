@@ -127,9 +127,6 @@ class LateRobot:
         self.sent.append((self.now_ns, velocity_m_s))
         self.machine.command(self.now_ns, np.array(velocity_m_s))
 
-    def send_force(self, force_n):
-        pass
-
     def close(self):
         pass
 

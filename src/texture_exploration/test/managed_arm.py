@@ -49,9 +49,6 @@ class ManagedTopics:
         self._velocity = velocity_m_s
         self._arm.command(time.monotonic_ns(), np.array(velocity_m_s))
 
-    def send_force(self, _force_n):
-        pass
-
     def switch_controllers(self, activate, deactivate):
         switch = {
             'activated': [*activate],

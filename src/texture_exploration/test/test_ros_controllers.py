@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from texture_core.errors import CommandRefused, DeviceError, ExplorationError, InvalidParameter, MotionRefused
-from texture_core.types import ExplorationRequest, Phase, quaternion_matrix, rotation_matrix
+from texture_core.types import ExplorationRequest, Phase, rotation_matrix
 from texture_exploration.arms.arm import ArmCommand
 from texture_exploration.arms.ros_controllers import RosControllersArm
-from texture_exploration.arms.tool_state import GRAVITY_M_S2, FollowWatch, ForceSample, PoseSample, ToolState
+from texture_exploration.arms.tool_state import FollowWatch, ForceSample, PoseSample
 from texture_exploration.arms.tool_state import RosControllersParams as Params
 from texture_exploration.exploration import Exploration
 from texture_exploration.explorer import Explorer
@@ -42,7 +42,6 @@ class Robot:
         self.heard_by = 1
         self.unsafe_because = ''
         self.sent = []  # velocities with their times
-        self.forces = []
         self.pressed_n = []  # the true force, in any direction
         self.closed = False
         self.switched, self.refused_switches = [], ()
@@ -85,10 +84,6 @@ class Robot:
     def send_velocity(self, velocity_m_s):
         self.sent.append((self.now_ns, velocity_m_s))
         self.arm.command(self.now_ns, np.array(velocity_m_s))
-
-    def send_force(self, force_n):
-        self.forces.append(force_n)
-        self.arm.press(np.array(force_n))
 
     def switch_controllers(self, activate, deactivate):
         self.switched.append((*activate, '-', *deactivate))
@@ -194,29 +189,6 @@ def test_the_tangential_force_is_friction_times_the_normal_force_and_unknown_at_
     state = robot.driven.state()
     assert state.force_n > 2.0
     assert state.tangential_force_n == pytest.approx(friction * state.force_n, rel=0.05)
-
-
-def test_the_weight_is_removed_also_when_the_tool_has_turned_since_the_zero():
-    params = Params(tool_mass_kg=0.5)
-    tool = ToolState(params)
-    weight = np.array([0.0, 0.0, -0.5 * GRAVITY_M_S2])
-    offset = np.array([0.7, -0.2, 1.1])
-
-    def show(now_ns, quaternion, height_m, push_n=0.0, moving=False):
-        to_base = quaternion_matrix(quaternion)
-        tool.take_pose(now_ns, PoseSample(now_ns, 'base', (0.4, 0.0, 0.1 + height_m), quaternion))
-        force = to_base.T @ (weight + np.array([0.0, 0.0, push_n])) + offset
-        tool.take_force(now_ns, ForceSample(now_ns, 'tool0_controller', tuple(force)), moving=moving)
-        return tool.state('').force_n
-
-    for step in range(50):
-        show(4_000_000 * (step + 1), TOOL_DOWN, 0.01 + 1e-4 * step, moving=True)
-    for step in range(60):
-        show(4_000_000 * (51 + step), TOOL_DOWN, 0.015)
-    assert tool.zero.zeroed
-    assert tool.zero.offset_n == pytest.approx(offset)
-    turned = (math.sin(0.6), 0.0, 0.0, math.cos(0.6))
-    assert show(4_000_000 * 120, turned, 0.015, push_n=2.0) == pytest.approx(2.0)
 
 
 def test_the_sensor_is_not_zeroed_in_contact(robot):
@@ -533,18 +505,6 @@ def test_the_force_is_kept_from_a_thirtieth_of_the_declared_stiffness_on(stiffne
     assert outcome.success, outcome.message
     assert max(forces['contact']) < 1.2
     assert np.sqrt(np.mean((np.array(forces['slide']) - 1.0) ** 2)) < 0.1  # the tolerance with which a slide begins
-
-
-def test_a_compliance_controller_presses_by_itself_and_is_let_go_at_the_end():
-    robot = Robot(TwistControllerParams(jitter_s=0.0), target_wrench_topic='target_wrench')
-    robot.connect()
-    robot.zero_force()
-    robot.pass_time(6.0, ArmCommand(force_n=2.0))
-    assert robot.forces[-1] == pytest.approx((0.0, 0.0, -2.0))
-    assert robot.arm.finger().force_n == pytest.approx(2.0, rel=0.05)
-    robot.driven.stop()
-    robot.pass_time(0.05)
-    assert robot.forces[-1] == (0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize('motion', MOTIONS)

@@ -420,6 +420,7 @@ GUARD_NICENESS = -10  # before other load of the machine
 # --------------------
 # Detect free air from the force while the finger rises.
 
+
 @dataclass(frozen=True)
 class ZeroingParams:
     """When a finger counts as in free air; a base of the parameters of each arm that zeroes its force sensor there."""

@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """An arm that ROS drives: a twist controller, poses and wrenches on topics.
 
-It commands velocities, and reads pose and force, over standard topics. The force is controlled by the velocity loop of
-the suite, or by a compliance controller if one is named. This file knows no ROS: the topics are behind
-`ControllerTopics`.
+It commands velocities, and reads pose and force, over standard topics; the velocity loop of the suite controls the
+force. This file knows no ROS: the topics are behind `ControllerTopics`.
 """
 
 from __future__ import annotations
@@ -61,9 +60,6 @@ class ControllerTopics(Protocol):
     def send_velocity(self, velocity_m_s: Vector) -> None:
         """Command a velocity in the frame `twist_frame_id`."""
 
-    def send_force(self, force_n: Vector) -> None:
-        """Command the force of the tool on its surroundings in the base frame; no effect without such a topic."""
-
     def switch_controllers(self, activate: Sequence[str], deactivate: Sequence[str]) -> None:
         """Let the controller manager switch both sets or nothing; DeviceError, with the reason, if it does not."""
 
@@ -113,12 +109,12 @@ class RosControllersArm(SurfaceArm):
     """
 
     Params = RosControllersParams
+    force_reading = ForceReading.NOISY
     _params: RosControllersParams
     _state: ArmState
     _command: tuple[ArmCommand, int] | None  # and when it came
     _commanded: Vector
     _sent_ns: int
-    _pressing: bool
 
     def __init__(
         self,
@@ -132,7 +128,6 @@ class RosControllersArm(SurfaceArm):
         self._open_topics = open_topics
         self._own_thread = own_thread
         self._switches = params.activate_controllers.split(), params.deactivate_controllers.split()
-        self.force_reading = ForceReading.MEASURED if params.force_is_quantised else ForceReading.NOISY
         self._topics: ControllerTopics | None = None
         self._thread: threading.Thread | None = None
         self._closing = threading.Event()
@@ -186,7 +181,6 @@ class RosControllersArm(SurfaceArm):
             self._thread = None
         topics, self._topics = self._topics, None
         if topics is not None:
-            self._stop_pressing(topics)
             topics.send_velocity(REST)
             topics.beat(moving=not self._tool.rest.at_rest)
             self._give_back(topics)
@@ -280,7 +274,6 @@ class RosControllersArm(SurfaceArm):
             self._failed = self._unsafe = reason
             self._command = None
             self._commanded = REST
-            self._stop_pressing(topics)
             topics.send_velocity(REST)
             self._state = replace(self._state, unsafe=reason, fault=self._lost)
 
@@ -304,7 +297,7 @@ class RosControllersArm(SurfaceArm):
         self._state = replace(self._tool.state(fault), unsafe=self._unsafe)
         self._zeroed = self._tool.zero.zeroed  # after the state, so that a reader finds the zeroed force
         self._carry_out(topics, self._due(now_ns), held_s)
-        topics.beat(moving=not self._tool.rest.at_rest or self._pressing)
+        topics.beat(moving=not self._tool.rest.at_rest)
 
     def _begin(self) -> ControllerTopics:
         """Close an earlier connection, and open the topics of a new one."""
@@ -322,7 +315,6 @@ class RosControllersArm(SurfaceArm):
         self._command = None
         self._commanded = REST
         self._sent_ns = self._gone_ns = self._halted_ns = 0
-        self._pressing = False  # a compliance controller was commanded a force
         self._zeroed = False
         self._resting_first = True
         self._unsafe = ''  # why it may only be lifted, until it is recovered or connected again
@@ -346,7 +338,7 @@ class RosControllersArm(SurfaceArm):
 
     def doubt(self) -> str:
         """Return in a sentence that the force is too late for force control, '' if not."""
-        return '' if self._params.target_wrench_topic else self._velocity.doubt()
+        return self._velocity.doubt()
 
     def warning(self) -> str:
         """Return in a sentence that controllers were not switched back, or that clocks do not agree; '' if neither."""
@@ -424,7 +416,7 @@ class RosControllersArm(SurfaceArm):
 
     def _restless(self, now_ns: int, held_s: float) -> str:
         """Return in a sentence that the arm moves although zero velocity is commanded, '' if it does not."""
-        excused = self._tool.rest.at_rest or self._commanded != REST or self._pressing
+        excused = self._tool.rest.at_rest or self._commanded != REST
         if excused or held_s > HEARTBEAT_S or not self._halted_ns:
             self._halted_ns = now_ns
         if now_ns - self._halted_ns <= RESTS_WITHIN_NS:
@@ -454,30 +446,12 @@ class RosControllersArm(SurfaceArm):
         state = self._state
         if command is not None and command.force_n is not None:
             self._tool.zero.presume_contact()
-            self._press(topics, command)
-        else:
-            self._stop_pressing(topics)
-        velocity = REST if state.fault else self._chosen(command or STANDSTILL, state, held_s)
-        if velocity != REST or self._pressing:
+        velocity = REST if state.fault else self._velocity.choose(command or STANDSTILL, state, held_s)
+        if velocity != REST:
             self._tool.rest.forget()
         if not self._tool.rest.at_rest:
             self._send(topics, velocity)
         self._commanded = velocity
-
-    def _press(self, topics: ControllerTopics, command: ArmCommand) -> None:
-        if self._params.target_wrench_topic:
-            topics.send_force(self._frame.to_base((0.0, 0.0, -(command.force_n or 0.0))))
-            self._pressing = True
-
-    def _stop_pressing(self, topics: ControllerTopics) -> None:
-        if self._pressing:
-            topics.send_force(REST)
-            self._pressing = False
-
-    def _chosen(self, command: ArmCommand, state: ArmState, held_s: float) -> Vector:
-        if command.force_n is not None and self._params.target_wrench_topic:
-            command = replace(command, force_n=None, normal_m_s=0.0)
-        return self._velocity.choose(command, state, held_s)
 
     def _send(self, topics: ControllerTopics, velocity: Vector) -> None:
         in_base = self._frame.to_base(velocity)
@@ -501,5 +475,4 @@ class RosControllersArm(SurfaceArm):
                 self._closing.wait(max(0.0, left_s))
         finally:
             # Also when a bug ends the loop: no arm is left moving.
-            self._stop_pressing(topics)
             topics.send_velocity(REST)
