@@ -236,17 +236,8 @@ def test_a_slow_command_does_not_trip_it_and_is_counted():
     assert (watchdog.slow, watchdog.slowest_s) == (1, pytest.approx(0.3))
 
 
-def test_a_controller_that_acknowledges_the_watchdog_itself_late_is_given_more_time():
-    control = TimedControl(late_s=0.3)
-    watchdog = watchdog_of(control)
-    assert watchdog.arm()
-    assert not control.tripped
-    assert control.period_s == pytest.approx(0.9)
-    assert (watchdog.moving_s, watchdog.widened) == (pytest.approx(0.9), True)
-    control.late_s = 0.002
-    assert watchdog.arm()
-    assert control.period_s == pytest.approx(0.1)
-    assert (watchdog.moving_s, watchdog.widened) == (pytest.approx(0.1), False)
+def test_a_controller_that_acknowledges_the_watchdog_itself_later_than_it_waits_is_not_guarded():
+    assert not watchdog_of(TimedControl(late_s=0.3)).arm()
 
 
 def test_it_guards_again_also_after_an_error():
@@ -261,36 +252,6 @@ def test_a_program_that_no_longer_runs_is_not_guarded():
     control = TimedControl()
     control.tripped = True
     assert not watchdog_of(control).arm()
-
-
-class MovingControl(TimedControl):
-    """The same, which also takes what moves the arm."""
-
-    def speedStop(self, _deceleration):  # noqa: N802
-        return self.take(0.0)
-
-    def forceModeStop(self):  # noqa: N802
-        return self.take(0.0)
-
-    def speedL(self, *_speed):  # noqa: N802
-        return self.take(0.0)
-
-    def kickWatchdog(self):  # noqa: N802
-        return self.take(0.0)
-
-
-def test_an_arm_at_rest_tries_again_to_have_the_watchdog_as_short_as_it_should_be():
-    control = MovingControl(late_s=0.3)
-    watchdog = watchdog_of(control)
-    commands = UrCommandStream(control, WATCHED, watchdog)
-    assert watchdog.arm()
-    commands.cycle(UrCommand(0, (0.0, 0.0, -0.01), None))
-    assert watchdog.moving_s == pytest.approx(0.9)
-    for _ in range(3):
-        commands.cycle(None)
-    control.late_s = 0.002
-    commands.cycle(UrCommand(0, (0.0, 0.0, -0.01), None))
-    assert watchdog.moving_s == control.period_s == pytest.approx(0.1)
 
 
 # --------------------
@@ -312,11 +273,15 @@ def test_an_arm_that_was_never_connected_says_so():
 
 
 @pytest.mark.parametrize(
-    ('version', 'oldest'), [((3, 3), '3.12'), ((5, 4), '5.6'), ((10, 8), '10.10'), ((1, 8), '3.12')]
+    ('version', 'said'),
+    [
+        ((3, 3), r'3\.3.*update it to 3.12 or newer'),
+        ((5, 4), r'5\.4.*update it to 5.6 or newer'),
+        ((1, 8), r'1\.8.*update it to 3.12 or newer'),
+        ((10, 10), r"10\.10 \(PolyScope X\) without a dashboard.*use the arm 'ros_controllers'"),
+    ],
 )
-def test_a_controller_that_is_too_old_is_refused(version, oldest, monkeypatch):
+def test_a_controller_that_is_too_old_or_has_no_dashboard_is_refused(version, said, monkeypatch):
     monkeypatch.setattr(ur_probe, 'rtde_version', lambda ip, timeout_s: version)
-    with pytest.raises(
-        DeviceError, match=rf'has the software {version[0]}\.{version[1]}.*update it to {oldest} or newer'
-    ):
+    with pytest.raises(DeviceError, match=f'has the software {said}'):
         UrArm(UrArmParams(ip='127.0.0.82')).connect()

@@ -390,11 +390,6 @@ class GuardProcess:
                 start_new_session=True,
             )
 
-    @property
-    def pid(self) -> int:
-        """Of the process."""
-        return self._process.pid
-
     def dismiss(self) -> None:
         """End the guard: the robot is at rest or released, or the connection is lost."""
         with contextlib.suppress(OSError, subprocess.TimeoutExpired):  # of a guard that has ended

@@ -50,8 +50,6 @@ from texture_exploration.force_control import FORCE_SPEED_M_S
 # While ur-rtde waits until a command is acknowledged it sends nothing, so that the watchdog would stop the arm in the
 # middle of a stop. Nor may anything else be sent then: it would overwrite the command.
 
-MARGIN = 3.0  # of the period, over the time that the controller took to acknowledge the watchdog itself
-
 
 class Watchdog:
     """Set the watchdog of the controller, and time the commands for which it has to wait."""
@@ -67,21 +65,13 @@ class Watchdog:
         self.slow = 0
         self.slowest_s = 0.0
         self._control = control
-        self._period_s = self.moving_s = 1.0 / params.watchdog_hz
+        self._period_s = 1.0 / params.watchdog_hz
         self._patient_s = max(ACKNOWLEDGE_S, self._period_s)
         self._guard = guard
         self._clock = clock
 
-    @property
-    def widened(self) -> bool:
-        """Whether the controller waits longer than 1 / `watchdog_hz` while the arm moves."""
-        return self.moving_s > self._period_s
-
     def arm(self) -> bool:
-        """Let the watchdog guard a moving arm; return whether the controller agreed.
-
-        A controller that acknowledges this late would be stopped by it at once: then it waits a little longer.
-        """
+        """Let the watchdog guard a moving arm; return whether the controller agreed."""
         with self.patient():
             pass
         return self.armed
@@ -89,13 +79,12 @@ class Watchdog:
     @contextmanager
     def patient(self) -> Iterator[None]:
         """Let the watchdog wait during the block, and guard a moving arm again afterwards."""
-        took_s = self._set(self._patient_s)
+        self.call(self._control.setWatchdog, 1.0 / self._patient_s)
         self.armed = False
         try:
             yield
         finally:
-            self.moving_s = max(self._period_s, min(MARGIN * took_s, self._patient_s))
-            self._set(self.moving_s)
+            self.armed = self.call(self._control.setWatchdog, 1.0 / self._period_s)
 
     def call(self, command: Callable[..., Any], *arguments: Any) -> bool:
         """Send a command that is acknowledged; return whether the controller accepted it."""
@@ -106,12 +95,6 @@ class Watchdog:
         self.slow += passed_s > self._period_s
         self.slowest_s = max(self.slowest_s, passed_s)
         return taken
-
-    def _set(self, period_s: float) -> float:
-        """Return the duration."""
-        begin_s = self._clock()
-        self.armed = self.call(self._control.setWatchdog, 1.0 / period_s)
-        return self._clock() - begin_s
 
 
 # --------------------
@@ -192,20 +175,14 @@ class UrCommandStream:
             self._count(bool(self._control.speedL([0.0] * 6, STOP_DECELERATION_M_S2, 1.0 / RATE_HZ)))
             return False
         self._leave(mode)
-        if not self._guarded(mode):
+        # The watchdog guards every mode but standstill.
+        if mode is not Mode.STANDSTILL and not self._watchdog.armed and not self._watchdog.arm():
             self._count(False)
             return False
         self._mode = mode
         self._rest_ns = self._measured_ns
         self._braking = self._next_is_speed = False
         return True
-
-    def _guarded(self, mode: Mode) -> bool:
-        """Return whether the watchdog guards a mode; at rest one that waits too long is set again."""
-        if mode is Mode.STANDSTILL:
-            return True
-        late = self._mode is Mode.STANDSTILL and self._watchdog.widened
-        return self._watchdog.arm() if late or not self._watchdog.armed else True
 
     def _leave(self, mode: Mode) -> None:
         """Do what ends the present mode."""
@@ -302,7 +279,7 @@ LOST = 'the connection to the controller was lost; is it still on, and the cable
 class Observer:
     """Reports the measurements of the controller, in a separate thread: commands may take a while.
 
-    `newest` is the last report, None before the first; `zeroed`, `watchdog_s` and `counts` come from the other thread.
+    `newest` is the last report, None before the first; `zeroed` and `counts` come from the other thread.
 
     Silence counts only while this thread is awake, so that a stalled machine is not reported as a dead controller.
     """
@@ -310,7 +287,7 @@ class Observer:
     def __init__(self, receive: Any, channel: socket.socket, params: UrArmParams) -> None:
         self.connected = True
         self.silent = self.zeroed = False
-        self.watchdog_s = 1.0 / params.watchdog_hz
+        self._watchdog_s = 1.0 / params.watchdog_hz
         self.counts: Mapping[str, int] = {}
         self.newest: UrReport | None = None
         self._receive = receive
@@ -354,7 +331,7 @@ class Observer:
             position_m=_vector(receive.getActualTCPPose()),
             velocity_m_s=_vector(receive.getActualTCPSpeed()),
             force_n=_vector(receive.getActualTCPForce()),
-            watchdog_s=self.watchdog_s,
+            watchdog_s=self._watchdog_s,
             safety_mode=receive.getSafetyMode(),
             playing=receive.getRuntimeState() == PROGRAM_PLAYING,
             silent=self.silent,
@@ -381,8 +358,6 @@ class Worker:
         control_class = importlib.import_module('rtde_control').RTDEControlInterface
         # Remote control has been checked already.
         flags = control_class.FLAG_UPLOAD_SCRIPT | control_class.FLAG_DISABLE_REMOTE_CONTROL_CHECK
-        if params.upper_range_registers:
-            flags |= control_class.FLAG_UPPER_RANGE_REGISTERS
         receive = receive_class(params.ip, RATE_HZ, VARIABLES)
         self._control = control_class(params.ip, RATE_HZ, flags)
         self._observer = Observer(receive, channel, params)
@@ -436,7 +411,6 @@ class Worker:
         commands, watchdog = self._commands, self._watchdog
         # After the cycle and not at once: a force that is reported as zeroed is from after the zeroing.
         self._observer.zeroed = commands.trusted
-        self._observer.watchdog_s = watchdog.moving_s
         self._observer.counts = {
             'refused': commands.refused,
             'zeroed': commands.zeroings,
