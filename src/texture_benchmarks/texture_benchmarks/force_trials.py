@@ -215,9 +215,6 @@ class Commander:
         """Command a velocity."""
         self.machine.take(velocity_m_s)
 
-    def switch_controllers(self, activate: Sequence[str], deactivate: Sequence[str]) -> None:
-        """There is nothing to switch."""
-
     def close(self) -> None:
         """There is nothing to wait for."""
 

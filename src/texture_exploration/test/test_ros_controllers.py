@@ -643,47 +643,6 @@ def test_explorations_begin_where_somebody_else_left_the_finger_but_not_where_a_
     assert math.dist(explorer.connect(), home) == pytest.approx(0.05)
 
 
-MANAGED = {
-    'controller_manager': 'controller_manager',
-    'activate_controllers': 'twist',
-    'deactivate_controllers': 'joints',
-}
-TAKEN, GIVEN_BACK = ('twist', '-', 'joints'), ('joints', '-', 'twist')
-
-
-def test_controllers_are_switched_for_the_connection_and_back_once_the_arm_is_at_rest():
-    robot = Robot(**MANAGED)
-    robot.arm.check()
-    assert robot.switched == []  # a check takes no control
-    robot.connect()
-    assert robot.switched == [TAKEN]
-    robot.arm.close()
-    assert robot.switched == [TAKEN, GIVEN_BACK]
-    assert robot.is_commanded_to_rest
-    robot.arm.close()
-    assert len(robot.switched) == 2
-
-
-def test_a_refused_switch_ends_the_connection_and_one_that_was_done_is_undone():
-    robot = Robot(connect_timeout_s=0.1, **MANAGED)
-    robot.refused_switches = (1,)
-    with pytest.raises(DeviceError, match='the manager refused'):
-        robot.arm.connect()
-    assert (robot.switched, robot.closed) == ([TAKEN], True)
-    robot.pose_comes = False
-    with pytest.raises(DeviceError, match='no pose arrives'):
-        robot.arm.connect()
-    assert robot.switched[1:] == [TAKEN, GIVEN_BACK]
-
-
-def test_controllers_that_cannot_be_switched_back_are_a_warning():
-    robot = Robot(**MANAGED).connect()
-    robot.refused_switches = (2,)
-    robot.arm.close()
-    assert robot.closed
-    assert robot.arm.warning() == 'the controllers were not switched back: the manager refused'
-
-
 # Deviation from the parameters of the arm, and the largest true force in any direction that follows, N.
 WALL = {'wall_m': 0.02, 'friction': 0.3}
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=5.0, distance_m=0.06)

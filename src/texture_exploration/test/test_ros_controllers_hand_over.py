@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What takes and gives back the arm behind ROS controllers: processes that end, the guard, the controller manager."""
+"""What takes and releases the arm behind ROS controllers: processes that end, and the guard."""
 
 import json
 import os
@@ -9,15 +9,12 @@ import socket
 import subprocess
 import sys
 import time
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from geometry_msgs.msg import PoseStamped, TwistStamped
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
-from std_srvs.srv import Trigger
 from texture_msgs import msg, srv
 
 from texture_core.errors import DeviceError
@@ -34,11 +31,8 @@ pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 PATIENT = RosControllersParams(connect_timeout_s=30.0, accept_no_timeout=True, accept_shared_group=True)
 HELD = {'start_height_m': 0.003, 'command_timeout_s': 0.0}  # as a controller that keeps executing the last velocity
 DEADLINE_S = 60.0
-MANAGED = {
-    'arm': 'managed_arm:ManagedArm',
-    'controller_manager': 'controller_manager',
-    'activate_controllers': 'twist',
-    'deactivate_controllers': 'joints',
+LOGGED = {
+    'arm': 'logged_arm:LoggedArm',
     'max_stiffness_n_m': 2000.0,  # that of the contact: it comes down faster
     'max_impact_n': 1.0,
     'watch_signal': False,
@@ -92,12 +86,12 @@ def end_by_deactivation(graph, _explorer):
     [end_by(signal.SIGINT), end_by(signal.SIGHUP), end_by(signal.SIGQUIT), end_by_deactivation],
     ids=['Ctrl-C', 'hang-up', 'quit', 'deactivation'],
 )
-def test_controllers_are_handed_back_with_the_finger_lifted_and_at_rest(graph, monkeypatch, tmp_path, end):
-    log = tmp_path / 'switches'
-    monkeypatch.setenv('MANAGED_LOG', str(log))
+def test_the_arm_is_released_with_the_finger_lifted_and_at_rest(graph, monkeypatch, tmp_path, end):
+    log = tmp_path / 'end'
+    monkeypatch.setenv('LOGGED_ARM', str(log))
     monkeypatch.setenv('PYTHONPATH', os.pathsep.join([str(Path(__file__).parent), os.environ.get('PYTHONPATH', '')]))
     states = graph.listen(msg.ExplorationState, 'exploration', STATE_QOS)
-    with NodeProcess('texture_exploration', 'explorer', MANAGED) as explorer:
+    with NodeProcess('texture_exploration', 'explorer', LOGGED) as explorer:
         client = graph.peer.create_client(srv.Explore, 'explore')
         graph.until(client.service_is_ready)
         request = ExplorationRequest('linear_slide', speed_m_s=0.01, force_n=1.0, distance_m=0.1)
@@ -114,11 +108,9 @@ def test_controllers_are_handed_back_with_the_finger_lifted_and_at_rest(graph, m
 
         graph.until(slides)
         end(graph, explorer)
-        taken, given_back = map(json.loads, log.read_text().splitlines())
-    assert (taken['activated'], taken['deactivated']) == (['twist'], ['joints'])
-    assert (given_back['activated'], given_back['deactivated']) == (['joints'], ['twist'])
-    assert given_back['at_rest']
-    assert given_back['height_m'] > 0.0  # in the slide it was pressed into the surface
+        released = json.loads(log.read_text())
+    assert released['at_rest']
+    assert released['height_m'] > 0.0  # in the slide it was pressed into the surface
 
 
 @pytest.mark.parametrize('transition', [Transition(id=Transition.TRANSITION_CONFIGURE), Transition(id=99)])
@@ -263,43 +255,3 @@ def test_two_announcements_of_other_commanders_are_waited_for_before_anything_is
     with pytest.raises(pytest.fail.Exception):
         controller_topics.RosTopics(PATIENT)
     assert sum(slept_s) == pytest.approx(6.0, abs=0.06)
-
-
-def test_a_hand_over_without_the_messages_of_the_controller_manager_is_refused(graph, monkeypatch):
-    def missing(name):
-        raise ImportError(name)
-
-    graph.peer.create_subscription(TwistStamped, 'twist_controller/twist', lambda _: None, 1)
-    topics = controller_topics.RosTopics(replace(PATIENT, controller_manager='controller_manager'))
-    try:
-        with monkeypatch.context() as patch, pytest.raises(DeviceError, match='which needs controller_manager_msgs'):
-            patch.setattr(controller_topics.importlib, 'import_module', missing)
-            topics.switch_controllers(('twist_controller',), ())
-    finally:
-        topics.close()
-
-
-def test_the_controller_manager_is_asked_over_ros_and_one_that_is_not_there_is_waited_for_in_vain(graph):
-    """The service stands in for SwitchController, whose messages the wheels of ROS lack."""
-    asked = []
-
-    def answer(request, response):
-        asked.append(request)
-        response.success, response.message = False, 'a stand-in'
-        return response
-
-    graph.peer.create_service(Trigger, 'manager/switch_controller', answer)
-    for topic in ('twist_controller/twist', 'another/twist'):
-        graph.peer.create_subscription(TwistStamped, topic, lambda _: None, 1)
-    topics = controller_topics.RosTopics(replace(PATIENT, connect_timeout_s=DEADLINE_S))
-    silent = controller_topics.RosTopics(replace(PATIENT, connect_timeout_s=5.0, twist_topic='another/twist'))
-    try:
-        with ThreadPoolExecutor() as pool:
-            answered = pool.submit(topics._ask, Trigger, 'manager/switch_controller', Trigger.Request())
-            graph.until(answered.done)
-        assert answered.result().message == 'a stand-in'
-        assert len(asked) == 1
-        assert silent._ask(Trigger, 'no_manager/switch_controller', Trigger.Request()) is None
-    finally:
-        topics.close()
-        silent.close()

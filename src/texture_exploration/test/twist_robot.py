@@ -4,7 +4,6 @@
 
 import numpy as np
 
-from texture_core.errors import DeviceError
 from texture_core.types import Phase
 from texture_exploration.arms.arm import ArmCommand
 from texture_exploration.arms.ros_controllers import RosControllersArm
@@ -38,7 +37,6 @@ class Robot:
         self.sent = []  # velocities with their times
         self.pressed_n = []  # the true force, in any direction
         self.closed = False
-        self.switched, self.refused_switches = [], ()
         self.phases, self.forces = [], {}  # of the exploration; the true normal force by phase
         self.arm = RosControllersArm(
             RosControllersParams(**given),
@@ -82,11 +80,6 @@ class Robot:
     def send_velocity(self, velocity_m_s):
         self.sent.append((self.now_ns, velocity_m_s))
         self.machine.command(self.now_ns, np.array(velocity_m_s))
-
-    def switch_controllers(self, activate, deactivate):
-        self.switched.append((*activate, '-', *deactivate))
-        if len(self.switched) in self.refused_switches:
-            raise DeviceError('the manager refused')
 
     def close(self):
         self.closed = True

@@ -12,7 +12,7 @@ import importlib
 import logging
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Protocol
 
@@ -59,9 +59,6 @@ class ControllerTopics(Protocol):
 
     def send_velocity(self, velocity_m_s: Vector) -> None:
         """Command a velocity in the frame `twist_frame_id`."""
-
-    def switch_controllers(self, activate: Sequence[str], deactivate: Sequence[str]) -> None:
-        """Let the controller manager switch both sets or nothing; DeviceError, with the reason, if it does not."""
 
     def close(self) -> None:
         """Wait until what was sent has arrived, and leave; the guard stays until an arm that may still move rests."""
@@ -127,13 +124,10 @@ class RosControllersArm(SurfaceArm):
         self._clock = clock
         self._open_topics = open_topics
         self._own_thread = own_thread
-        self._switches = params.activate_controllers.split(), params.deactivate_controllers.split()
         self._topics: ControllerTopics | None = None
         self._thread: threading.Thread | None = None
         self._closing = threading.Event()
         self._late = 0
-        self._switched = False  # controllers were switched for this connection
-        self._hand_over_fault = ''
         self._restart()
 
     def check(self) -> None:
@@ -160,10 +154,8 @@ class RosControllersArm(SurfaceArm):
         """
         topics = self._begin()
         try:
-            self._take_over(topics)
             self._wait_for_controllers(topics)
         except DeviceError:
-            self._give_back(topics)
             topics.close()
             raise
         self._closing.clear()
@@ -183,7 +175,6 @@ class RosControllersArm(SurfaceArm):
         if topics is not None:
             topics.send_velocity(REST)
             topics.beat(moving=not self._tool.rest.at_rest)
-            self._give_back(topics)
             topics.close()
 
     def state(self) -> ArmState:
@@ -321,28 +312,13 @@ class RosControllersArm(SurfaceArm):
         self._lost = ''  # a fault that stays as long
         self._failed = ''  # with an internal error
 
-    def _take_over(self, topics: ControllerTopics) -> None:
-        if self._params.controller_manager:
-            topics.switch_controllers(*self._switches)
-            self._switched, self._hand_over_fault = True, ''
-
-    def _give_back(self, topics: ControllerTopics) -> None:
-        """Switch the controllers back; a failure is only reported."""
-        if not self._switched:
-            return
-        self._switched = False
-        try:
-            topics.switch_controllers(*reversed(self._switches))
-        except DeviceError as error:
-            self._hand_over_fault = f'the controllers were not switched back: {error}'
-
     def doubt(self) -> str:
         """Return in a sentence that the force is too late for force control, '' if not."""
         return self._velocity.doubt()
 
     def warning(self) -> str:
-        """Return in a sentence that controllers were not switched back, or that clocks do not agree; '' if neither."""
-        return self._hand_over_fault or self._tool.skew
+        """Return in a sentence that clocks do not agree, '' if they do."""
+        return self._tool.skew
 
     def _connected(self) -> ControllerTopics:
         if self._topics is None:

@@ -48,16 +48,6 @@ class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams, Co
     twist_frame_id: str = param(
         '', "Frame in which velocities are commanded, the base frame or that of the fingertip; '' is the base."
     )
-    controller_manager: str = param(
-        '', "Controller manager that switches controllers when the arm is connected and released; '' switches nothing."
-    )
-    activate_controllers: str = param(
-        'twist_controller', 'Controllers, separated by spaces, that are active only while the arm is connected.'
-    )
-    deactivate_controllers: str = param(
-        'scaled_joint_trajectory_controller',
-        'Controllers, separated by spaces, that are inactive only while the arm is connected.',
-    )
     rate_hz: float = param(
         250.0,
         'Rate of commands; a higher rate reacts faster and costs computing time.',

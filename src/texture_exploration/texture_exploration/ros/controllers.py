@@ -11,17 +11,14 @@ by the guard. On other machines the ids of the publishers decide; rclpy has no e
 
 from __future__ import annotations
 
-import importlib
 import os
 import time
-from collections.abc import Sequence
 from typing import Any
 
 import rclpy
 from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
 from rclpy.context import Context
 from rclpy.duration import Duration
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
@@ -145,39 +142,6 @@ class RosTopics:
         linear = message.twist.linear
         linear.x, linear.y, linear.z = velocity_m_s
         self._twists.publish(message)
-
-    def switch_controllers(self, activate: Sequence[str], deactivate: Sequence[str]) -> None:
-        """Let the controller manager switch both sets or nothing."""
-        manager = self._params.controller_manager
-        try:
-            kind = importlib.import_module('controller_manager_msgs.srv').SwitchController
-        except ImportError as error:
-            raise DeviceError(
-                f"parameter 'controller_manager' is '{manager}', which needs controller_manager_msgs; install it "
-                "(ros-jazzy-controller-manager-msgs), or set it to '' and switch the controllers by hand"
-            ) from error
-        request = kind.Request(activate_controllers=[*activate], deactivate_controllers=[*deactivate])
-        request.strictness = kind.Request.STRICT
-        answer = self._ask(kind, f'{manager}/switch_controller', request)
-        if answer is None or not answer.ok:
-            did = 'does not answer' if answer is None else f'refused: {getattr(answer, "message", "") or "see its log"}'
-            raise DeviceError(
-                f"'{manager}' was to activate {' '.join(activate)} instead of {' '.join(deactivate)}, and {did}"
-            )
-
-    def _ask(self, kind: Any, name: str, request: Any) -> Any:
-        """Return the answer of a service, None if none comes in time; the node is not spun meanwhile."""
-        client = self._node.create_client(kind, name)
-        executor = SingleThreadedExecutor(context=self._context)
-        try:
-            if not client.wait_for_service(self._params.connect_timeout_s):
-                return None
-            future = client.call_async(request)
-            rclpy.spin_until_future_complete(self._node, future, executor, self._params.connect_timeout_s)
-            return future.result() if future.done() else None
-        finally:
-            executor.shutdown()
-            self._node.destroy_client(client)
 
     def _wait_until_alone(self) -> None:
         """Return once the controller is found and has no other commander, which this check must not disturb."""
