@@ -26,7 +26,7 @@ from texture_exploration.arms.dynamixel import DynamixelBus, DynamixelFinger, Dy
 from texture_exploration.arms.hand import SimulatedHand, load_profile, read_profile
 from texture_exploration.arms.in_hand import InHandArm, InHandParams
 from texture_exploration.explorer import Explorer
-from texture_exploration.safety import CommandLimits, SafetyLimits
+from texture_exploration.safety import SafetyLimits
 from texture_exploration.touch import TouchParams
 from texture_simulation.devices.dynamixel import (
     GOAL_CURRENT,
@@ -258,23 +258,16 @@ def test_a_motor_that_was_reset_is_named_and_driven_again_after_a_new_connection
     assert (bus.motors.tables[5][TORQUE], bus.motors.tables[5][WATCHDOG]) == (1, 15)
 
 
-def test_a_second_program_on_the_bus_is_refused_and_disturbs_nothing(bus, hand):
-    hand.connect()
-    with pytest.raises(DeviceError, match='no other program has it open'):
-        DynamixelHand('leap', str(bus.port.link)).connect()
-    with pytest.raises(DeviceError, match='no other program has it open'):
-        DynamixelHand('leap', str(bus.port.link)).reboot()
-    until(lambda: fault_of(hand) == '')
-    until(lambda: all(table[TORQUE] for table in bus.motors.tables.values()))
-
-
 def test_a_second_program_is_refused_before_it_opens_the_line_and_empties_its_buffer(bus, hand, monkeypatch):
     hand.connect()
-    opened = []
+    second, opened = DynamixelHand('leap', str(bus.port.link)), []
     monkeypatch.setattr('dynamixel_sdk.PortHandler.openPort', lambda port: opened.append(port) or True)
-    with pytest.raises(DeviceError, match='no other program has it open'):
-        DynamixelHand('leap', str(bus.port.link)).connect()
+    for ask in (second.connect, second.reboot):
+        with pytest.raises(DeviceError, match='no other program has it open'):
+            ask()
     assert not opened
+    until(lambda: fault_of(hand) == '')
+    assert all(table[TORQUE] for table in bus.motors.tables.values())
 
 
 def test_a_late_answer_to_a_ping_is_not_taken_for_a_position(bus, hand, monkeypatch):
@@ -350,13 +343,6 @@ def test_an_error_that_a_reboot_does_not_clear_is_reported(bus, hand, monkeypatc
 def test_a_simulated_hand_has_nothing_to_reboot():
     with pytest.raises(DeviceError, match='a simulated hand has no motors that could be rebooted'):
         InHandArm().reboot()
-
-
-def test_a_hand_keeps_the_limits_of_commands(monkeypatch):
-    monkeypatch.setattr(CommandLimits, 'command_force_n', 0.5)
-    arm = InHandArm()
-    with pytest.raises(CommandRefused, match=r'the force is 2 N; allowed is 0 to 0\.5 N'):
-        arm.connect()
 
 
 def test_the_guard_sends_what_the_sdk_would_send(tmp_path):
@@ -443,17 +429,13 @@ def test_an_unknown_finger_set_is_reported_with_the_nearest():
         InHandArm(InHandParams(finger_set='kaboli-trane'))
 
 
-def test_every_shipped_profile_can_be_read():
+def test_every_shipped_profile_can_be_read_and_a_broken_one_is_reported(tmp_path):
+    (tmp_path / 'mine.yaml').write_text('models: [1240]\n')
+    with pytest.raises(InvalidParameter, match="hand profile 'mine' cannot be read"):
+        load_profile(str(tmp_path / 'mine.yaml'))
     for name in ('leap', 'x330', 'xm430'):
         assert load_profile(name).ids
     assert len(LEAP.ids) == 16
-
-
-def test_a_broken_profile_is_reported(tmp_path):
-    path = tmp_path / 'mine.yaml'
-    path.write_text('models: [1]\n')
-    with pytest.raises(InvalidParameter, match="hand profile 'mine' cannot be read"):
-        load_profile(str(path))
 
 
 def test_a_dynamixel_hand_holds_while_two_fingers_slide(bus, tmp_path):

@@ -130,7 +130,7 @@ TOPICS = ('/twist', 'base', '/pose')
 
 def test_a_guard_in_the_namespace_commands_zero_velocity_once_nobody_speaks_for_the_arm(graph):
     twists = graph.listen(TwistStamped, 'twist')
-    guard = guard_process.TwistGuard(0.05, '/left', TOPICS, os.open(os.devnull, os.O_RDONLY))
+    guard = guard_process.TwistGuard('/left', TOPICS, os.open(os.devnull, os.O_RDONLY))
     try:
         graph.until(lambda: guard.beat(moving=True) or graph.peer.count_publishers('twist'))
         graph.until(lambda: twists)
@@ -151,7 +151,7 @@ class Line:
         monkeypatch.setattr(guard_process.GuardProcess, '__init__', lambda _self, *_arguments, **_named: None)
         monkeypatch.setattr(guard_process.time, 'monotonic', lambda: self.now_s)
         self.now_s, self.answers = 100.0, []
-        self.guard = guard_process.TwistGuard(0.05, '/', TOPICS, -1)
+        self.guard = guard_process.TwistGuard('/', TOPICS, -1)
         self.guard.line, self.guard._process = self, self
 
     def recv(self, _size):
@@ -186,7 +186,7 @@ def test_a_guard_whose_explorer_has_ended_commands_zero_until_the_pose_shows_res
     with line:
         ours.send(guard_process.MOVING)
         ours.close()
-        guard_process.guarded(line, 0.05, lambda: zeros.append(len(poses)), take_pose, lambda: None)
+        guard_process.guarded(line, lambda: zeros.append(len(poses)), take_pose, lambda: None)
     assert len(zeros) >= rests_after
     assert poses[-1] == pytest.approx(0.001 * rests_after)
 

@@ -26,7 +26,7 @@ from rclpy.signals import SignalHandlerOptions
 from texture_core.errors import DeviceError
 from texture_core.ros import to_ns
 from texture_exploration.arms.arm import Vector, claim, give_up_when_ending
-from texture_exploration.arms.tool_state import HEARTBEAT_S, ForceSample, PoseSample, RosControllersParams
+from texture_exploration.arms.tool_state import ForceSample, PoseSample, RosControllersParams
 from texture_exploration.ros.guard import MEASURED_QOS, TwistGuard, ignore, newest, participant, scope, sender, stamped
 
 CONTROLLER_TOPICS_NODE = 'arm_topics'
@@ -87,7 +87,7 @@ class RosTopics:
         self._forces = node.create_subscription(WrenchStamped, params.wrench_topic, ignore, MEASURED_QOS)
         self._frame_id = params.twist_frame_id or params.base_frame_id
         topics = (self._twists.topic_name, self._frame_id, self._poses.topic_name)
-        self._guard = TwistGuard(HEARTBEAT_S, node.get_namespace(), topics, self._lock)
+        self._guard = TwistGuard(node.get_namespace(), topics, self._lock)
         if not (params.controller_timeout_s or scope()):
             node.get_logger().warning(f"'accept_shared_group' is true: {NO_SCOPE.format(topic=params.twist_topic)}")
 

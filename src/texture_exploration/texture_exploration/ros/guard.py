@@ -29,6 +29,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from texture_core.errors import DeviceError
 from texture_exploration.arms.arm import DONE, LEAVE_S, GuardProcess, RestWatch, guard_socket
+from texture_exploration.arms.tool_state import HEARTBEAT_S
 
 # --------------------
 # Messages to the controllers, and who sends them.
@@ -107,9 +108,9 @@ def scope() -> tuple[str, ...]:
 class TwistGuard(GuardProcess):
     """The guard of one arm; no controller may be commanded that it does not reach, or once it has ended."""
 
-    def __init__(self, heartbeat_s: float, namespace: str, topics: tuple[str, str, str], lock: int) -> None:
+    def __init__(self, namespace: str, topics: tuple[str, str, str], lock: int) -> None:
         # In a separate control group, if possible: what ends all processes of a service must not end the guard first.
-        super().__init__(__name__, str(heartbeat_s), namespace, *topics, start=scope(), holds=(lock,))
+        super().__init__(__name__, namespace, *topics, start=scope(), holds=(lock,))
         self.reached = 0  # subscribers that it has found; discovery takes a while and must precede a failure
         self.participant = ''
         self._heard_s = 0.0
@@ -148,7 +149,7 @@ class TwistGuard(GuardProcess):
 
 def main() -> None:
     """Run as `python -m texture_exploration.ros.guard SOCKET …`, with what `TwistGuard` takes; it starts it."""
-    _, _, heartbeat_s, namespace, topic, frame_id, pose_topic = sys.argv
+    _, _, namespace, topic, frame_id, pose_topic = sys.argv
     line = guard_socket()
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node(TWIST_GUARD_NODE, namespace=namespace, enable_rosout=False, start_parameter_services=False)
@@ -170,14 +171,13 @@ def main() -> None:
             line.send(f'{publisher.get_subscription_count()} {identity}'.encode())
 
     line.setblocking(False)
-    guarded(line, float(heartbeat_s), command_standstill, take_pose, answer)
+    guarded(line, command_standstill, take_pose, answer)
     node.destroy_node()  # otherwise ROS shows it for 20 s as another commander
     rclpy.shutdown()
 
 
 def guarded(
     line: Any,
-    heartbeat_s: float,
     command_standstill: Callable[[], None],
     take_pose: Callable[[RestWatch], None],
     answer: Callable[[], None],
@@ -199,7 +199,7 @@ def guarded(
                 break
             moving, heard_s = received == MOVING, now_s
             rest.forget()
-        elif moving and now_s - heard_s > heartbeat_s and not rest.at_rest:
+        elif moving and now_s - heard_s > HEARTBEAT_S and not rest.at_rest:
             take_pose(rest)
             command_standstill()
         if now_s - answered_s > ANSWER_S:
