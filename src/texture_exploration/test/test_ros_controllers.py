@@ -607,6 +607,18 @@ def test_a_finger_that_is_found_pressed_is_lifted_until_nothing_touches_it(robot
     assert robot.is_commanded_to_rest
 
 
+def test_an_arm_that_lost_its_zero_between_two_explorations_lifts_first(noisy):
+    explorer = explorer_over(noisy)
+    explorer._lift_first = False  # as after a success
+    noisy.pose_comes = False
+    noisy.pass_time(0.2)
+    noisy.pose_comes = True
+    noisy.pass_time(0.5)
+    assert (noisy.arm.zeroed, explorer.fault()) == (False, '')
+    outcome = explorer._prepare('one', PRESS).run(lambda: noisy.pass_time(0.01))
+    assert outcome.success, outcome.message
+
+
 def test_a_check_commands_nothing_and_leaves_the_topics():
     robot = Robot(connect_timeout_s=0.1)
     robot.arm.check()
