@@ -72,18 +72,6 @@ def describe(model: int) -> str:
     return f'{model} ({MODELS[model].name})' if model in MODELS else str(model)
 
 
-def differs(model: int, current_a: float, torque_nm_a: float) -> str:
-    """Return how a model's torque per count departs from that of given scales, '' if it does not."""
-    scale = MODELS[model]
-    count_nm = scale.current_a * scale.torque_nm_a
-    if abs(current_a * torque_nm_a / count_nm - 1) <= TOLERANCE:
-        return ''
-    return (
-        f'model {describe(model)} makes {scale.torque_nm_a:.2f} N·m/A at {scale.current_a * 1000:g} mA per count, and '
-        f'the profile says {torque_nm_a:g} N·m/A at {current_a * 1000:g} mA per count'
-    )
-
-
 # --------------------
 # Interface of every hand: hold with some fingers, and move others as an arm does.
 
@@ -276,9 +264,12 @@ def _check_models(profile: Profile, where: str) -> None:
             'model has other registers and another torque'
         )
     for model in profile.models:
-        if difference := differs(model, profile.current_a, profile.torque_nm_a):
+        scale = MODELS[model]
+        if abs(profile.current_a * profile.torque_nm_a / (scale.current_a * scale.torque_nm_a) - 1) > TOLERANCE:
             raise InvalidParameter(
-                f'{where}: {difference}; give each model a separate profile, with its current_a and torque_nm_a'
+                f'{where}: model {describe(model)} makes {scale.torque_nm_a:.2f} N·m/A at '
+                f'{scale.current_a * 1000:g} mA per count, and the profile says {profile.torque_nm_a:g} N·m/A at '
+                f'{profile.current_a * 1000:g} mA per count; give each model a separate profile, with its torque_nm_a'
             )
 
 
