@@ -236,8 +236,17 @@ def test_a_slow_command_does_not_trip_it_and_is_counted():
     assert (watchdog.slow, watchdog.slowest_s) == (1, pytest.approx(0.3))
 
 
-def test_a_controller_that_acknowledges_the_watchdog_itself_later_than_it_waits_is_not_guarded():
-    assert not watchdog_of(TimedControl(late_s=0.3)).arm()
+def test_a_controller_that_acknowledges_the_watchdog_itself_late_is_given_more_time():
+    control = TimedControl(late_s=0.3)
+    watchdog = watchdog_of(control)
+    assert watchdog.arm()
+    assert not control.tripped
+    assert control.period_s == pytest.approx(0.9)
+    assert watchdog.moving_s == pytest.approx(0.9)
+    control.late_s = 0.002
+    assert watchdog.arm()
+    assert control.period_s == pytest.approx(0.1)
+    assert watchdog.moving_s == pytest.approx(0.1)
 
 
 def test_it_guards_again_also_after_an_error():
@@ -252,6 +261,36 @@ def test_a_program_that_no_longer_runs_is_not_guarded():
     control = TimedControl()
     control.tripped = True
     assert not watchdog_of(control).arm()
+
+
+class MovingControl(TimedControl):
+    """The same, which also takes what moves the arm."""
+
+    def speedStop(self, _deceleration):  # noqa: N802
+        return self.take(0.0)
+
+    def forceModeStop(self):  # noqa: N802
+        return self.take(0.0)
+
+    def speedL(self, *_speed):  # noqa: N802
+        return self.take(0.0)
+
+    def kickWatchdog(self):  # noqa: N802
+        return self.take(0.0)
+
+
+def test_an_arm_at_rest_tries_again_to_have_the_watchdog_as_short_as_it_should_be():
+    control = MovingControl(late_s=0.3)
+    watchdog = watchdog_of(control)
+    commands = UrCommandStream(control, WATCHED, watchdog)
+    assert watchdog.arm()
+    commands.cycle(UrCommand(0, (0.0, 0.0, -0.01), None))
+    assert watchdog.moving_s == pytest.approx(0.9)
+    for _ in range(3):
+        commands.cycle(None)
+    control.late_s = 0.002
+    commands.cycle(UrCommand(0, (0.0, 0.0, -0.01), None))
+    assert watchdog.moving_s == control.period_s == pytest.approx(0.1)
 
 
 # --------------------

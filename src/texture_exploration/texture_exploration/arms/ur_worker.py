@@ -50,6 +50,8 @@ from texture_exploration.force_control import FORCE_SPEED_M_S
 # While ur-rtde waits until a command is acknowledged it sends nothing, so that the watchdog would stop the arm in the
 # middle of a stop. Nor may anything else be sent then: it would overwrite the command.
 
+MARGIN = 3.0  # of the period, over the time that the controller took to acknowledge the watchdog itself
+
 
 class Watchdog:
     """Set the watchdog of the controller, and time the commands for which it has to wait."""
@@ -65,13 +67,16 @@ class Watchdog:
         self.slow = 0
         self.slowest_s = 0.0
         self._control = control
-        self._period_s = 1.0 / params.watchdog_hz
+        self._period_s = self.moving_s = 1.0 / params.watchdog_hz
         self._patient_s = max(ACKNOWLEDGE_S, self._period_s)
         self._guard = guard
         self._clock = clock
 
     def arm(self) -> bool:
-        """Let the watchdog guard a moving arm; return whether the controller agreed."""
+        """Let the watchdog guard a moving arm; return whether the controller agreed.
+
+        A controller that acknowledges this late would be stopped by it at once: then it waits a little longer.
+        """
         with self.patient():
             pass
         return self.armed
@@ -79,12 +84,13 @@ class Watchdog:
     @contextmanager
     def patient(self) -> Iterator[None]:
         """Let the watchdog wait during the block, and guard a moving arm again afterwards."""
-        self.call(self._control.setWatchdog, 1.0 / self._patient_s)
+        took_s = self._set(self._patient_s)
         self.armed = False
         try:
             yield
         finally:
-            self.armed = self.call(self._control.setWatchdog, 1.0 / self._period_s)
+            self.moving_s = max(self._period_s, min(MARGIN * took_s, self._patient_s))
+            self._set(self.moving_s)
 
     def call(self, command: Callable[..., Any], *arguments: Any) -> bool:
         """Send a command that is acknowledged; return whether the controller accepted it."""
@@ -95,6 +101,12 @@ class Watchdog:
         self.slow += passed_s > self._period_s
         self.slowest_s = max(self.slowest_s, passed_s)
         return taken
+
+    def _set(self, period_s: float) -> float:
+        """Return the duration."""
+        begin_s = self._clock()
+        self.armed = self.call(self._control.setWatchdog, 1.0 / period_s)
+        return self._clock() - begin_s
 
 
 # --------------------
@@ -175,8 +187,9 @@ class UrCommandStream:
             self._count(bool(self._control.speedL([0.0] * 6, STOP_DECELERATION_M_S2, 1.0 / RATE_HZ)))
             return False
         self._leave(mode)
-        # The watchdog guards every mode but standstill.
-        if mode is not Mode.STANDSTILL and not self._watchdog.armed and not self._watchdog.arm():
+        # The watchdog guards every mode but standstill; at rest one that waits too long is set again.
+        late = self._mode is Mode.STANDSTILL and self._watchdog.moving_s > 1.0 / self._params.watchdog_hz
+        if mode is not Mode.STANDSTILL and (late or not self._watchdog.armed) and not self._watchdog.arm():
             self._count(False)
             return False
         self._mode = mode
@@ -279,7 +292,7 @@ LOST = 'the connection to the controller was lost; is it still on, and the cable
 class Observer:
     """Reports the measurements of the controller, in a separate thread: commands may take a while.
 
-    `newest` is the last report, None before the first; `zeroed` and `counts` come from the other thread.
+    `newest` is the last report, None before the first; `zeroed`, `watchdog_s` and `counts` come from the other thread.
 
     Silence counts only while this thread is awake, so that a stalled machine is not reported as a dead controller.
     """
@@ -287,7 +300,7 @@ class Observer:
     def __init__(self, receive: Any, channel: socket.socket, params: UrArmParams) -> None:
         self.connected = True
         self.silent = self.zeroed = False
-        self._watchdog_s = 1.0 / params.watchdog_hz
+        self.watchdog_s = 1.0 / params.watchdog_hz
         self.counts: Mapping[str, int] = {}
         self.newest: UrReport | None = None
         self._receive = receive
@@ -331,7 +344,7 @@ class Observer:
             position_m=_vector(receive.getActualTCPPose()),
             velocity_m_s=_vector(receive.getActualTCPSpeed()),
             force_n=_vector(receive.getActualTCPForce()),
-            watchdog_s=self._watchdog_s,
+            watchdog_s=self.watchdog_s,
             safety_mode=receive.getSafetyMode(),
             playing=receive.getRuntimeState() == PROGRAM_PLAYING,
             silent=self.silent,
@@ -411,6 +424,7 @@ class Worker:
         commands, watchdog = self._commands, self._watchdog
         # After the cycle and not at once: a force that is reported as zeroed is from after the zeroing.
         self._observer.zeroed = commands.trusted
+        self._observer.watchdog_s = watchdog.moving_s
         self._observer.counts = {
             'refused': commands.refused,
             'zeroed': commands.zeroings,
