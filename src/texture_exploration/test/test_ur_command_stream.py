@@ -157,26 +157,36 @@ def test_a_slide_commands_force_and_speed_by_turns_and_ends_with_the_finger_lift
     assert link.robot.pressing_n == 0.0
 
 
-@pytest.mark.parametrize('paused_s', [0.15, 0.3])
-def test_an_explorer_that_was_paused_before_a_wall_leads_the_finger_back_from_it(paused_s):
+@pytest.mark.parametrize('where', ['before the wall', 'before the way back is sent'])
+@pytest.mark.parametrize('paused_s', [0.15, 0.2, 0.3])
+def test_an_explorer_that_was_paused_at_a_wall_leads_the_finger_back_from_it(paused_s, where):
     link = SteppedLink([], wall_m=0.02, stop_force_n=1e5)
     limits = SafetyLimits(state_timeout_s=1.0)
     explorer = Explorer(link.arm, TouchParams(), limits, lambda _state: None, lambda: link.now_ns)
-    pauses, peak_n = [paused_s], 0.0
+    pauses, forces_n, send = [paused_s], [], link.send
 
-    def pace():
-        nonlocal peak_n
-        link.pace()
-        if link.arm.state().position[0] > 0.018 and pauses:  # the newest command holds meanwhile
+    def pause(place):
+        if place == where and pauses:  # the newest command holds meanwhile
             for _ in range(round(pauses.pop() / 0.01)):
                 link.pace()
-        peak_n = max(peak_n, np.linalg.norm(link.robot.force))
 
+    def pace():
+        link.pace()
+        if link.arm.state().position[0] > 0.018:
+            pause('before the wall')
+        forces_n.append(np.linalg.norm(link.robot.force))
+
+    def paused_send(data):
+        if link.arm.state().force_size_n > limits.force_limit_n:
+            pause('before the way back is sent')
+        send(data)
+
+    link.send = paused_send
     request = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=5.0, distance_m=0.06)
     outcome = explorer._prepare('one', request).run(pace)
-    assert peak_n > 100.0
+    assert max(forces_n) > 100.0
     assert outcome.lifted, outcome.message
-    assert link.arm.state().force_size_n < 0.5
+    assert forces_n[-1] < 0.5
 
 
 def test_a_finger_that_turns_back_out_of_force_control_is_led_back_before_anything_is_waited_for():
