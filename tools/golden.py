@@ -452,10 +452,10 @@ def _hand(recording: Recording) -> dict[str, Any]:
 
 
 def _ros_controllers(recording: Recording) -> dict[str, Any]:
-    harness = importlib.import_module('test_ros_controllers')
+    harness = importlib.import_module('twist_robot')
     robot = harness.Robot(harness.TwistControllerParams(jitter_s=0.0))
     recording.listen(robot, 'send_velocity', list)
-    return recording.stepped(robot.driven, lambda: robot.now_ns, lambda: robot.pass_time(0.01))
+    return recording.stepped(robot.arm, lambda: robot.now_ns, lambda: robot.pass_time(0.01))
 
 
 def _ur(recording: Recording) -> dict[str, Any]:

@@ -215,12 +215,6 @@ class Commander:
         """Command a velocity."""
         self.machine.take(velocity_m_s)
 
-    def send_force(self, force_n: Vector) -> None:
-        """It takes velocities alone."""
-
-    def switch_controllers(self, activate: Sequence[str], deactivate: Sequence[str]) -> None:
-        """There is nothing to switch."""
-
     def close(self) -> None:
         """There is nothing to wait for."""
 

@@ -365,7 +365,7 @@ class Explorer:
             except MotionRefused as error:
                 sentence = f'{error}; the workspace of a request with a start is the surface patch'
                 raise MotionRefused(sentence, error.error, error.field) from error
-        if self._lift_first:
+        if self._lift_first or not self.arm.zeroed:
             if self._zero_n is None or self.arm.zeroed:
                 self._zero_n = self.arm.state().force_vector_n
             motion.lift_first(lambda: self.arm.zeroed, self._zero_n)

@@ -214,7 +214,8 @@ class ForceGuard:
         self._zero: Vector | None = None  # reading of the sensor at the start, while it is not zeroed
         self._way: deque[tuple[int, ArmCommand, float]] = deque()  # with the size of the force
         self._back: ArmCommand | None = None
-        self._back_ns = 0
+        self._back_ns = self._newest_ns = 0
+        self._paused = False
         self._came_back = False  # there is one way back
         self._largest_n = 0.0
 
@@ -237,18 +238,24 @@ class ForceGuard:
         """Return the command; or, after an abort, the way back as long as the finger is blocked."""
         now_ns, size_n = arm.time_ns, arm.force_size_n
         held = bool(self._limits.force_violation(arm) or self._limits.friction_violation(arm))
-        while self._way and now_ns - self._way[0][0] > WAY_S * 1e9:
-            self._way.popleft()
         if aborted and held and self._way:
             # A force that did not grow on the way, as that of a broken sensor, does not end on the way back.
             if size_n - min(before_n for _, _, before_n in self._way) > self._limits.tangential_floor_n:
-                self._back, self._back_ns = self._way_back(), now_ns
+                self._back = self._way_back()
+                self._back_ns = self._newest_ns = now_ns
             self._way.clear()
             self._came_back = True
         if self._back is None:
             if not self._came_back:
                 self._way.append((now_ns, command, size_n))
+                # Counted from the newest command: after a pause of this process it is the one that led to the obstacle.
+                while now_ns - self._way[0][0] > WAY_S * 1e9:
+                    self._way.popleft()
             return command
+        # After a pause of this process the way back has yet to take effect; only once, so that it ends.
+        if now_ns - self._newest_ns > GAP_NS and not self._paused:
+            self._paused, self._back_ns = True, now_ns
+        self._newest_ns = now_ns
         # Half of the allowance: what is left then is no more than noise.
         self._largest_n = max(self._largest_n, size_n)
         back_s = (now_ns - self._back_ns) * 1e-9
