@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The state machine and the limits: what the page shows is what the code does."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -10,9 +11,9 @@ from texture_core.types import ExplorationRequest, Phase
 from texture_exploration import force_control, guards, lift_first, safety, stages, touch, watches
 from texture_exploration.arms.arm import STANDSTILL
 from texture_exploration.arms.simulated import SimulatedArmParams
-from texture_exploration.motion import STATES, state_table
+from texture_exploration.explorer import PERIOD_S
+from texture_exploration.motion import LIMITS, STATES, state_table
 from texture_exploration.motions import MOTIONS
-from texture_exploration.safety import LIMITS, limit_table
 
 PAGE = Path(__file__).parents[3] / 'docs' / 'motion.md'
 
@@ -20,7 +21,7 @@ PAGE = Path(__file__).parents[3] / 'docs' / 'motion.md'
 def test_the_page_shows_the_states_and_the_limits_of_the_code():
     page = PAGE.read_text(encoding='utf-8')
     assert state_table() in page
-    assert limit_table() in page
+    assert LIMITS in page
 
 
 def kind(command):
@@ -67,24 +68,20 @@ def test_every_limit_of_the_table_is_a_name_of_the_code():
     known = {name for module in (force_control, lift_first, safety, touch, watches) for name in vars(module)}
     for given in (safety.SafetyLimits, safety.CommandLimits, guards.SignalWatchParams, touch.TouchParams):
         known |= {*vars(given), *given.__dataclass_fields__}
-    for row in LIMITS:
-        names = row.name.replace(', …', '').replace(' to ', ', ').split(', ')
-        assert [name for name in names if name not in known] == []
+    for name in re.findall(r'^\| `(.*?)`', LIMITS, re.MULTILINE):
+        assert {*name.replace(', …', '').replace(' to ', ', ').split(', ')} <= known
 
 
-DECLARED = {
-    'force_limit_n': (safety.SafetyLimits().force_limit_n, '10 N'),
-    'friction_limit': (safety.SafetyLimits().friction_limit, '2 × normal + 1 N'),
-    'state_timeout_s': (safety.SafetyLimits().state_timeout_s, '0.13 s'),
-    'frozen_force_s': (safety.SafetyLimits().frozen_force_s, '0.06 s'),
-    'lost_contact_s': (touch.TouchParams().lost_contact_s, '0.1 s'),
-    'stall_s': (touch.TouchParams().stall_s, '25 % in 0.25 s'),
-    'signal_timeout_s': (guards.SignalWatchParams().signal_timeout_s, '0.5 s'),
-}
+def test_the_sentences_of_the_pages_hold_the_limits_of_the_code():
+    limit_n, stiff = safety.SafetyLimits().force_limit_n, touch.TouchParams(approach_stiffness_n_m=20000.0)
+    slow, slower = (f'{1e3 * stiff.slide_m_s(limit_n, delay_s):.0f} mm/s with' for delay_s in (0.02, 0.05))
+    assert f'exceed {touch.WALL_SHARE:g} times `force_limit_n`' in PAGE.read_text()
+    assert f'at 20 kN/m above {slow} 20 ms delay, above {slower} 50 ms' in PAGE.read_text()
+    assert f'(delay + {1e3 * touch.STEP_S:g} ms)' in PAGE.read_text()
+    for page in (PAGE, PAGE.with_name('safety.md')):
+        above = re.findall(r'above (\d+) N', page.read_text())
+        assert {*map(float, above)} == {limit_n}
 
 
-@pytest.mark.parametrize('name', DECLARED)
-def test_the_value_in_the_table_is_the_default_of_the_code(name):
-    value, stated = DECLARED[name]
-    assert next(row.value for row in LIMITS if row.name == name) == stated
-    assert f'{value:g}' in stated
+def test_each_step_of_the_table_is_the_period_of_the_explorer():
+    assert f'each step, {1e3 * PERIOD_S:g} ms' in LIMITS

@@ -56,12 +56,6 @@ class Stage:
         """Return the command, None when the stage is over; MotionAborted if its goal cannot be reached."""
         raise NotImplementedError
 
-    def see(self, arm: ArmState) -> None:
-        """Note a state after the end."""
-
-    def watch_anew(self) -> None:
-        """Discard the forces until now: another part commanded the arm."""
-
     def timed_step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Return the command; MotionAborted also if the stage takes too long."""
         command = self.step(time_ns, arm)
