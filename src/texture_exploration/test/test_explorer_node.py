@@ -19,12 +19,15 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 from texture_msgs import action, msg, srv
+from tf2_msgs.msg import TFMessage
 
 from texture_core.errors import InvalidParameter
 from texture_core.ros import ESTIMATE_QOS, SENSOR_QOS, STATE_QOS, WaitingExecutor, check_names, to_msg, to_ns
 from texture_core.ros_testing import LocalGraph, killed_on_error
-from texture_core.types import FingerReceiver, Phase, Rejection, TextureEstimate
-from texture_exploration.nodes.explorer import ExplorerNode
+from texture_core.types import FingerReceiver, Phase, Rejection, TextureEstimate, quaternion_matrix
+from texture_exploration.arms.arm import SurfaceFrame
+from texture_exploration.arms.simulated import SimulatedArm
+from texture_exploration.nodes.explorer import STATIC_QOS, ExplorerNode
 from texture_simulation.devices.dynamixel import ERROR, OVERLOAD, EmulatedDynamixelBus, leap_hand
 
 QUICK = {'motion': 'linear_slide', 'speed_m_s': 0.1, 'distance_m': 0.02}
@@ -148,11 +151,6 @@ def world(make_world):
     return make_world()
 
 
-def test_a_finger_that_may_be_pressed_is_lifted_at_the_start_if_that_is_asked_for(make_world):
-    world = make_world(lift_at_start=True)
-    assert world.explorer._explorer.arm.state().position[2] > 0.006  # from 0.002 by the clearance
-
-
 def test_a_service_call_explores_and_reports(world):
     before = world.client.get_clock().now().nanoseconds
     response = world.explored(world.call(**QUICK, surface='cork'))
@@ -178,6 +176,20 @@ def test_states_carry_the_position_of_the_finger_in_the_surface_frame(make_world
     assert end.position.x - begin.position.x == pytest.approx(QUICK['speed_m_s'] * passed_s, abs=0.003)
     assert abs(end.position.y - begin.position.y) < 1e-3
     assert abs(end.position.z) < 2e-3  # pressed on the plane z = 0
+
+
+def test_the_surface_is_broadcast_where_the_arm_believes_it_in_its_base_frame(make_world, monkeypatch):
+    pose, here = (0.4, -0.1, 0.02, 0.2, -0.1, 0.5), (0.01, 0.02, 0.03)
+    monkeypatch.setattr(SimulatedArm, 'base_frame_id', 'base')
+    monkeypatch.setattr(SimulatedArm, 'surface_pose', pose)
+    world, heard = make_world(surface_frame_id='table'), []
+    world.client.create_subscription(TFMessage, '/tf_static', heard.append, STATIC_QOS)
+    world.until(lambda: heard)
+    [transform] = heard[0].transforms
+    assert (transform.header.frame_id, transform.child_frame_id) == ('base', 'table')
+    shift, turned = transform.transform.translation, transform.transform.rotation
+    in_base = quaternion_matrix((turned.x, turned.y, turned.z, turned.w)) @ here + (shift.x, shift.y, shift.z)
+    assert in_base == pytest.approx(SurfaceFrame(pose).place_to_base(here))
 
 
 def test_an_unknown_motion_is_refused_with_the_nearest_name(world):

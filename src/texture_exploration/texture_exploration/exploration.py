@@ -10,7 +10,7 @@ import threading
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -91,13 +91,6 @@ class ExplorationOutcome:
     def success(self) -> bool:
         """Whether it was completed."""
         return self.error is ExplorationError.NONE
-
-    @property
-    def severity(self) -> Literal['info', 'warning', 'error']:
-        """Level of the log: an abort is a warning, a finger that was not lifted is an error."""
-        if self.success:
-            return 'info'
-        return 'warning' if self.lifted else 'error'
 
     def sentence(self, exploration_id: str) -> str:
         """Return the message for the log."""

@@ -6,11 +6,10 @@ from __future__ import annotations
 
 import contextlib
 import copy
-import importlib
 import itertools
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any
@@ -26,6 +25,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 from texture_msgs import action, msg, srv
+from tf2_msgs.msg import TFMessage
 
 from texture_core.config import find, param, parameters_of
 from texture_core.errors import DeviceError, ExplorationError, InvalidData, InvalidParameter, MotionRefused, UnknownName
@@ -44,7 +44,6 @@ from texture_core.ros import (
     quality_of_service,
     run,
     to_msg,
-    to_stamp,
 )
 from texture_core.types import ExplorationState, Phase, RoughnessEstimate, TextureEstimate, quaternion
 from texture_exploration.arms.arm import ENDING
@@ -65,102 +64,19 @@ from texture_exploration.motions import DEFAULTS, MOTIONS
 from texture_exploration.safety import SafetyLimits, SurfacePatch
 from texture_exploration.touch import TouchParams
 
-# --------------------
-# Frames of surface and fingertip on tf, where tf2_msgs is installed.
-
 STATIC_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-MOVING_QOS = QoSProfile(depth=100)
-
-
-@dataclass(frozen=True)
-class FrameParams:
-    """Parameters of the frames in published messages."""
-
-    surface_frame_id: str = param(
-        'surface',
-        'Frame of the surface in the headers of the published states; in a namespace NAMESPACE/ is put before it.',
-    )
-    fingertip_frame_id: str = param(
-        'fingertip', 'Frame of the fingertip that is broadcast; in a namespace NAMESPACE/ is put before it.'
-    )
-    broadcast_surface: bool = param(
-        True, 'Broadcasts the surface in the base frame of the arm on /tf_static, if tf2_msgs is installed.'
-    )
-    broadcast_fingertip: bool = param(
-        False,
-        'Broadcasts where the fingertip is in the frame of the surface on /tf while it explores; leave it off if the '
-        'description of the robot holds the fingertip.',
-    )
-
-
-class FrameBroadcaster:
-    """Publish transforms of one arm."""
-
-    def __init__(self, node: Any, params: FrameParams) -> None:
-        self._node = node
-        self.surface_frame_id = frame_name(node.get_namespace(), params.surface_frame_id)
-        self._fingertip_frame_id = frame_name(node.get_namespace(), params.fingertip_frame_id)
-        self._static = self._moving = None
-        try:
-            self._kind = importlib.import_module('tf2_msgs.msg').TFMessage
-        except ImportError as error:
-            if params.broadcast_fingertip:
-                raise InvalidParameter(
-                    "parameter 'broadcast_fingertip' is true, which needs tf2_msgs; install it (ros-jazzy-tf2-msgs)"
-                ) from error
-            node.get_logger().info('no frame is published on tf, as tf2_msgs is not installed')
-            return
-        if params.broadcast_surface:
-            self._static = node.create_publisher(self._kind, '/tf_static', STATIC_QOS)
-        if params.broadcast_fingertip:
-            self._moving = node.create_publisher(self._kind, '/tf', MOVING_QOS)
-
-    def surface(self, base_frame_id: str, pose: Sequence[float]) -> None:
-        """Broadcast the pose of the surface in the base frame: place in m, then a rotation vector in rad, (6,)."""
-        if self._static is None:
-            return
-        transform = self._transform(base_frame_id, self.surface_frame_id, pose[:3])
-        transform.header.stamp = self._node.get_clock().now().to_msg()
-        turned = transform.transform.rotation
-        turned.x, turned.y, turned.z, turned.w = quaternion(pose[3:])
-        self._static.publish(self._kind(transforms=[transform]))
-
-    def fingertip(self, state: ExplorationState) -> None:
-        """Broadcast the position of the finger, with the axes of the surface; a state without one is skipped."""
-        if self._moving is None or state.x_m != state.x_m:
-            return
-        place = (state.x_m, state.y_m, state.z_m)
-        transform = self._transform(self.surface_frame_id, self._fingertip_frame_id, place)
-        transform.header.stamp = to_stamp(state.stamp_ns)
-        self._moving.publish(self._kind(transforms=[transform]))
-
-    @staticmethod
-    def _transform(parent: str, child: str, place_m: Sequence[float]) -> TransformStamped:
-        transform = TransformStamped(child_frame_id=child)
-        transform.header.frame_id = parent
-        shift = transform.transform.translation
-        shift.x, shift.y, shift.z = map(float, place_m)
-        return transform
-
-
 FEEDBACK_PERIOD_S = 0.05
 IDLE_PERIOD_S = 1.0
-# rclpy raises an error if one line of code logs at several levels, so each level has a separate line.
-LOGGED: dict[str, Callable[[Any, str], Any]] = {
-    'info': lambda logger, text: logger.info(text),
-    'warning': lambda logger, text: logger.warning(text),
-    'error': lambda logger, text: logger.error(text),
-}
 PRESSED = (
     'the force sensor shows {:.1f} N, so the finger may press, as after an explorer that was killed: `texture lift` '
-    "lifts it now, and the first exploration does so; 'lift_at_start: true' does so at every start"
+    'lifts it now, and the first exploration does so'
 )
 RESULT_KEPT_S = 60  # for a late client; rclpy's 15 min are hundreds of results
 
 
 @dataclass(frozen=True)
 class ExplorerParams:
-    """The arm, and when control of it is taken."""
+    """The arm, when control of it is taken, and the frame of the surface."""
 
     arm: str = param('simulated', "Arm that carries the finger: a name of the catalogue, or a user's 'module:Class'.")
     autostart: bool = param(
@@ -168,13 +84,13 @@ class ExplorerParams:
         'Configures and activates the node at start-up, which takes control of the arm; false leaves that to a '
         'lifecycle manager.',
     )
-    lift_at_start: bool = param(
-        False,
-        'Lifts the finger until nothing touches it whenever the node takes control of the arm, as an explorer that was '
-        'killed leaves it pressed.',
-    )
     estimate_timeout_s: float = param(
         1.0, 'How long to wait for the final estimates after the finger was lifted.', unit='s', low=0.0, high=60.0
+    )
+    surface_frame_id: str = param(
+        'surface',
+        'Frame of the surface, in the headers of the published states and on /tf_static; in a namespace NAMESPACE/ is '
+        'put before it.',
     )
 
 
@@ -187,11 +103,11 @@ class ExplorerNode(PatientLifecycleNode):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('explorer', **kwargs)
         params = declare(self, ExplorerParams)
-        self._estimate_timeout_s = params.estimate_timeout_s
+        self._estimate_timeout_s, self._autostart = params.estimate_timeout_s, params.autostart
+        self._surface_frame_id = frame_name(self.get_namespace(), params.surface_frame_id)
         self._explorer = self._make_explorer(params.arm)
-        self._frames = FrameBroadcaster(self, declare(self, FrameParams))
+        self._transforms = self.create_publisher(TFMessage, '/tf_static', STATIC_QOS)
         self._broadcast_surface()
-        self._follow_parameters()
         self._rng, self._numbers = np.random.default_rng(), itertools.count(1)
         self._open: dict[str, ExplorationEstimates] = {}  # explorations whose caller still waits, by id
         self._last_end, self._not_lifted = 'none', ''  # in sentences
@@ -222,13 +138,12 @@ class ExplorerNode(PatientLifecycleNode):
             'explore',
             self._on_goal,
             callback_group=group,
-            cancel_callback=_accept_cancel,
+            cancel_callback=lambda _goal: CancelResponse.ACCEPT,
             result_timeout=RESULT_KEPT_S,
         )
         self.create_timer(IDLE_PERIOD_S, self._publish_idle)
         Diagnostics(self, self._report)
         self._publish_idle()
-        self._autostart, self._lift_at_start = params.autostart, params.lift_at_start
         if self._autostart:
             self.trigger_configure()
             self.trigger_activate()
@@ -245,12 +160,12 @@ class ExplorerNode(PatientLifecycleNode):
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Take control of the arm; at the start of the node an arm that is not there yet is waited for."""
-        connected = self._tried(self._explorer.connect)
-        if connected and self._lift_at_start:
-            self._tried(self._explorer.lift)
-        elif connected:
-            self._tried(self._name_pressed)
-        if not (connected and self._tried(self._explorer.check_start)) and not self._autostart:
+        usable = (
+            self._tried(self._explorer.connect)
+            and self._tried(self._name_pressed)
+            and self._tried(self._explorer.check_start)
+        )
+        if not usable and not self._autostart:
             self._explorer.release()
             return TransitionCallbackReturn.FAILURE
         self._active = True
@@ -263,14 +178,9 @@ class ExplorerNode(PatientLifecycleNode):
             self.get_logger().warning(PRESSED.format(force_n))
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Lift the finger and release the arm."""
+        """Lift the finger and release the arm; a cleanup finds it released."""
         self._let_go()
         return super().on_deactivate(state)
-
-    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Do nothing: the arm was released by the deactivation."""
-        self._let_go()
-        return super().on_cleanup(state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Lift the finger and release the arm, from any state."""
@@ -319,6 +229,10 @@ class ExplorerNode(PatientLifecycleNode):
         limits = declare(self, SafetyLimits, changeable=True)
         explorer = Explorer(arm, touch, limits, self._on_state, signal_fault=self._watch_signal())
         explorer.patch = declare(self, SurfacePatch, changeable=True)
+        # Changed parameters hold from the next exploration on; those of arm and sensor are fixed.
+        on_change(self, TouchParams, partial(setattr, explorer, 'touch'))
+        on_change(self, SafetyLimits, partial(setattr, explorer, 'limits'))
+        on_change(self, SurfacePatch, partial(setattr, explorer, 'patch'))
         return explorer
 
     def _watch_signal(self) -> Callable[[Listening], str]:
@@ -340,12 +254,6 @@ class ExplorerNode(PatientLifecycleNode):
                 msg.TactileSignal, topic, lambda _data, name=name: watch.on_samples(name), SENSOR_QOS, raw=True
             )
         return watch.signal_fault
-
-    def _follow_parameters(self) -> None:
-        """Let changed parameters hold from the next exploration on; those of arm and sensor are fixed."""
-        on_change(self, TouchParams, partial(setattr, self._explorer, 'touch'))
-        on_change(self, SafetyLimits, partial(setattr, self._explorer, 'limits'))
-        on_change(self, SurfacePatch, partial(setattr, self._explorer, 'patch'))
 
     def _on_service(self, request: srv.Explore.Request, response: srv.Explore.Response) -> srv.Explore.Response:
         response.result = self._explore(request.request, lambda exploration: exploration.ended.wait())
@@ -404,7 +312,14 @@ class ExplorerNode(PatientLifecycleNode):
             )
 
     def _log_end(self, exploration_id: str, outcome: ExplorationOutcome) -> None:
-        LOGGED[outcome.severity](self.get_logger(), outcome.sentence(exploration_id))
+        """Log how it ended: an abort is a warning, a finger that was not lifted an error."""
+        logger, sentence = self.get_logger(), outcome.sentence(exploration_id)
+        if outcome.success:
+            logger.info(sentence)
+        elif outcome.lifted:
+            logger.warning(sentence)
+        else:
+            logger.error(sentence)
 
     def _give_feedback(self, goal: Any, exploration: Exploration) -> None:
         """Publish feedback to the client; stop when it cancels."""
@@ -463,9 +378,9 @@ class ExplorerNode(PatientLifecycleNode):
             return
         estimates.update(estimate)
         current = self._explorer.current
-        wanted = current is not None and current.request.early_stopping
-        ours = current is not None and current.exploration_id == estimate.exploration_id
-        if wanted and ours and isinstance(estimate, TextureEstimate) and may_stop(estimate):
+        if current is None or current.exploration_id != estimate.exploration_id or not current.request.early_stopping:
+            return
+        if isinstance(estimate, TextureEstimate) and may_stop(estimate):
             current.finish(
                 f"ended early: '{estimate.label}' is decided with {estimate.confidence:.2f} "
                 f'after {estimate.windows} windows'
@@ -505,14 +420,20 @@ class ExplorerNode(PatientLifecycleNode):
         return 'an exploration is running' if self._explorer.current else self._explorer.fault()
 
     def _broadcast_surface(self) -> None:
+        """Broadcast the pose of the surface in the base frame of the arm, if it has one."""
         arm = self._explorer.arm
-        if arm.base_frame_id:
-            self._frames.surface(arm.base_frame_id, arm.surface_pose)
+        if not arm.base_frame_id:
+            return
+        header = Header(stamp=self.get_clock().now().to_msg(), frame_id=arm.base_frame_id)
+        transform = TransformStamped(header=header, child_frame_id=self._surface_frame_id)
+        shift, turned = transform.transform.translation, transform.transform.rotation
+        shift.x, shift.y, shift.z = map(float, arm.surface_pose[:3])
+        turned.x, turned.y, turned.z, turned.w = quaternion(arm.surface_pose[3:])
+        self._transforms.publish(TFMessage(transforms=[transform]))
 
     def _publish(self, state: ExplorationState) -> None:
         try:
             self._states.publish(to_msg(state))
-            self._frames.fingertip(state)
         except RCLError:
             # After a shutdown of ROS there is no subscriber, but the finger still has to be lifted.
             if self.context.ok():
@@ -522,7 +443,7 @@ class ExplorerNode(PatientLifecycleNode):
         """Return the state with its stamp on the clock of ROS instead of CLOCK_MONOTONIC."""
         age_ns = self._explorer.now_ns() - state.stamp_ns
         stamp_ns = self.get_clock().now().nanoseconds - age_ns
-        return replace(state, stamp_ns=stamp_ns, frame_id=self._frames.surface_frame_id)
+        return replace(state, stamp_ns=stamp_ns, frame_id=self._surface_frame_id)
 
     def _report(self) -> DiagnosticReport:
         current, fault = self._explorer.current, self._explorer.fault()
@@ -541,10 +462,6 @@ class ExplorerNode(PatientLifecycleNode):
             return 'ERROR', fault, numbers
         warning = self._explorer.arm.warning() or ('' if current else self._not_lifted)
         return ('WARN', warning, numbers) if warning else ('OK', 'the arm answers', numbers)
-
-
-def _accept_cancel(_goal: Any) -> CancelResponse:
-    return CancelResponse.ACCEPT
 
 
 def main() -> None:
