@@ -289,11 +289,7 @@ class SignalWatchParams:
         "Topics whose samples are watched, separated by spaces: 'finger0/signal finger1/signal' for two fingers.",
     )
     signal_timeout_s: float = param(
-        0.5,
-        'How long no sample may arrive before the exploration is aborted.',
-        unit='s',
-        low=0.02,
-        high=5.0,
+        0.5, 'How long no sample may arrive before the exploration aborts.', unit='s', low=0.02, high=5.0
     )
 
     def __post_init__(self) -> None:

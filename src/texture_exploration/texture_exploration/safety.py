@@ -56,42 +56,22 @@ class SafetyLimits:
     """Limits of requests, of measurements and of the duration of each phase."""
 
     max_speed_m_s: float = param(
-        0.25,
-        'Highest speed that may be requested; faster requests are refused.',
-        unit='m/s',
-        low=1e-4,
-        high=1.0,
+        0.25, 'Highest speed that may be requested; a faster one is refused.', unit='m/s', low=1e-4, high=1.0
     )
     min_force_n: float = param(
-        0.1, 'Lowest normal force that may be requested; smaller forces are refused.', unit='N', low=0.01
+        0.1, 'Lowest normal force that may be requested; a smaller one is refused.', unit='N', low=0.01
     )
     max_force_n: float = param(
-        6.0,
-        'Highest normal force that may be requested; larger forces are refused.',
-        unit='N',
-        low=0.01,
-        high=50.0,
+        6.0, 'Highest normal force that may be requested; a larger one is refused.', unit='N', low=0.01, high=50.0
     )
     force_limit_n: float = param(
-        10.0,
-        'Measured force, in any direction, above which an exploration is aborted.',
-        unit='N',
-        low=0.1,
-        high=100.0,
+        10.0, 'Measured force, in any direction, above which an exploration aborts.', unit='N', low=0.1, high=100.0
     )
     friction_limit: float = param(
-        2.0,
-        'Highest force along the surface, as a multiple of the normal force, above which an exploration is '
-        'aborted; it must exceed the friction of finger and samples.',
-        low=0.1,
-        high=20.0,
+        2.0, 'Force along the surface, by the normal force, that aborts; it must exceed friction.', low=0.1, high=20.0
     )
     tangential_floor_n: float = param(
-        1.0,
-        'Force along the surface that is allowed beyond friction; it must exceed the noise of the force sensor.',
-        unit='N',
-        low=0.05,
-        high=20.0,
+        1.0, 'Force along the surface allowed beyond friction; above all noise.', unit='N', low=0.05, high=20.0
     )
     frozen_force_s = 0.06  # of a reading that stays the same where it should change: six states at 100 Hz
     force_drift_fraction = 0.3  # of the wanted force, that the force in free air may change over an exploration
@@ -103,23 +83,12 @@ class SafetyLimits:
     z_low_m: float = _edge(-0.02, 'Lowest z')
     z_high_m: float = _edge(0.2, 'Highest z')
     surface_tolerance_m: float = param(
-        0.02,
-        'Largest distance of a contact from the declared surface, upwards or downwards; a contact farther away aborts. '
-        'An arm without a base frame has no declared surface.',
-        unit='m',
-        low=0.001,
-        high=0.5,
+        0.02, 'Largest height of a contact above or below the declared surface.', unit='m', low=0.001, high=0.5
     )
     state_timeout_s: float = param(
-        0.13,
-        'Age of the newest arm state above which an exploration is aborted; a longer time notices a dead arm later.',
-        unit='s',
-        low=0.01,
-        high=2.0,
+        0.13, 'Age of the newest state of the arm that aborts.', unit='s', low=0.01, high=2.0
     )
-    approach_timeout_s: float = param(
-        10.0, 'How long the approach to the surface may take before the exploration is aborted.', unit='s', low=0.1
-    )
+    approach_timeout_s: float = param(10.0, 'How long the approach to the surface may take.', unit='s', low=0.1)
     contact_timeout_s = 10.0  # that force and speed may take to settle: a contact 30 times softer than declared
     slide_overtime_s = 2.0  # longer than planned, that a slide may take
     lift_timeout_s = 5.0  # that braking and lifting may take: three times what they do
