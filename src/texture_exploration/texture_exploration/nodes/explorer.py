@@ -393,7 +393,7 @@ class ExplorerNode(PatientLifecycleNode):
     def _publish_idle(self) -> None:
         with self._publishing:
             if self._explorer.current is None:
-                idle = ExplorationState(self._explorer.now_ns(), '', '', Phase.IDLE, lifted=self._explorer.lifted)
+                idle = ExplorationState(self._explorer.clock(), '', '', Phase.IDLE, lifted=self._explorer.lifted)
                 self._publish(self._stamped(idle))
         self._publish_info()
 
@@ -441,7 +441,7 @@ class ExplorerNode(PatientLifecycleNode):
 
     def _stamped(self, state: ExplorationState) -> ExplorationState:
         """Return the state with its stamp on the clock of ROS instead of CLOCK_MONOTONIC."""
-        age_ns = self._explorer.now_ns() - state.stamp_ns
+        age_ns = self._explorer.clock() - state.stamp_ns
         stamp_ns = self.get_clock().now().nanoseconds - age_ns
         return replace(state, stamp_ns=stamp_ns, frame_id=self._surface_frame_id)
 
