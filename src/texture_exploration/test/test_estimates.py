@@ -4,34 +4,9 @@ import re
 import threading
 
 import numpy as np
-import pytest
 
-from texture_core.errors import ExplorationError
 from texture_core.types import Rejection, RoughnessEstimate, TextureEstimate
-from texture_exploration.exploration import (
-    STILL_MOVING,
-    ExplorationEstimates,
-    ExplorationOutcome,
-    may_stop,
-    new_id,
-)
-
-
-@pytest.mark.parametrize(
-    ('outcome', 'severity', 'sentence'),
-    [
-        (ExplorationOutcome(ExplorationError.NONE, 'done', True), 'info', '17: done'),
-        (
-            ExplorationOutcome(ExplorationError.STOPPED, 'stopped', True),
-            'warning',
-            '17: stopped; the finger was lifted',
-        ),
-        (ExplorationOutcome(ExplorationError.STOPPED, 'no lift', True, lifted=False), 'error', '17: no lift'),
-        (STILL_MOVING, 'error', '17: the explorer ended before the finger was lifted; look at the robot'),
-    ],
-)
-def test_an_abort_is_a_warning_and_a_finger_that_was_not_lifted_an_error(outcome, severity, sentence):
-    assert (outcome.severity, outcome.sentence('17')) == (severity, sentence)
+from texture_exploration.exploration import ExplorationEstimates, may_stop, new_id
 
 
 def test_an_id_tells_time_and_number_and_differs_between_two_nodes_that_begin_at_once():

@@ -328,13 +328,8 @@ def test_nothing_is_guaranteed_for_a_turn(table):
 
 def guaranteed_speeds(table, request):
     """Explore, and return the true speeds at all times for which a steady one was guaranteed, m/s."""
-    speeds, pace = [], table.pace
-
-    def watched():
-        pace()
-        speeds.append((table.now_ns, math.hypot(*table.arm.state().velocity[:2])))
-
-    table.pace = watched
+    speeds = []
+    table.at_each_step = lambda: speeds.append((table.now_ns, math.hypot(*table.arm.state().velocity[:2])))
     assert table.explore(request).success
     guaranteed = [(s.stamp_ns, s.stamp_ns + s.steady_s * 1e9) for s, _ in sliding(table)]
     return [speed for stamp, speed in speeds if any(begin <= stamp < end for begin, end in guaranteed)]

@@ -233,7 +233,10 @@ class Exploration:
     def _tick(self) -> bool:
         """Do one step; return whether the exploration has ended."""
         arm, now_ns = self._sound_state(), self._clock()
-        self._detect_gap(now_ns)
+        if now_ns - self._last_ns > GAP_NS:
+            self._listening = Listening(self._begin_ns, self._last_ns, now_ns)
+            self.gaps += 1
+        self._last_ns = now_ns
         fault = arm_fault(arm, now_ns, self._limits, self._listening)
         if fault:
             self._give_up(ExplorationError.ARM_FAULT, f'{fault}; the finger was not lifted')
@@ -243,7 +246,9 @@ class Exploration:
         if reason:
             self._abort = self._abort or reason
             self._motion.abort(reason[1])
-        if self._awaits_samples():
+        # The finger rests until the sensor delivers; silence from before the request counts.
+        self._signal_seen = self._signal_seen or bool(self._abort) or not self._signal_fault(WITHOUT_GAPS)
+        if not self._signal_seen:
             self._arm.command(ArmCommand())
             return False
         if self._finish_reason:
@@ -262,11 +267,6 @@ class Exploration:
         self._force_watch.note(step.phase, arm, step.command)
         self._publish_state(now_ns, step, arm)
         return step.phase in ENDED
-
-    def _awaits_samples(self) -> bool:
-        """Return whether the finger rests until the sensor delivers; silence from before the request counts."""
-        self._signal_seen = self._signal_seen or bool(self._abort) or not self._signal_fault(WITHOUT_GAPS)
-        return not self._signal_seen
 
     @property
     def _error(self) -> ExplorationError:
@@ -309,12 +309,6 @@ class Exploration:
         timeout_s = self.request.timeout_s
         late = timeout_s > 0.0 and (now_ns - self._begin_ns) * 1e-9 > timeout_s
         return f'the exploration took longer than its timeout of {timeout_s:g} s' if late else ''
-
-    def _detect_gap(self, now_ns: int) -> None:
-        if now_ns - self._last_ns > GAP_NS:
-            self._listening = Listening(self._begin_ns, self._last_ns, now_ns)
-            self.gaps += 1
-        self._last_ns = now_ns
 
     def _publish_state(self, now_ns: int, step: MotionStep, arm: ArmState) -> None:
         """Report the state if its phase is new or the time has come."""

@@ -135,7 +135,7 @@ class Motion:
             command=command,
             phase=self._phase,
             steady_s=self._stage.steady_s if self._stage else 0.0,
-            direction_rad=self._slide.direction_rad,
+            direction_rad=self._slide.along.follower.direction_rad,
             progress=self._slide.progress,
         )
 
@@ -158,7 +158,7 @@ class Motion:
         """End the slide as soon as the guaranteed time is over; without effect before and after it."""
         if self._stage is self._slide and not self._finish_reason:
             self._finish_reason = reason
-            self._slide.finish()
+            self._slide.finishing = True
 
     def note_way_back(self) -> None:
         """Note that the finger moved back from an obstacle instead of the last command."""

@@ -287,7 +287,9 @@ class ExplorerNode(PatientLifecycleNode):
         estimates = self._open[exploration.exploration_id] = ExplorationEstimates(exploration.exploration_id)
         try:
             wait(exploration)
-            self._wait_for_final_estimates(exploration, estimates)
+            if exploration.outcome.slid and not self._closing:
+                kinds = [kind for kind in ('texture', 'roughness') if self.count_publishers(kind)]
+                estimates.wait_until_final(kinds, self._estimate_timeout_s)
         finally:
             del self._open[exploration.exploration_id]
         outcome = exploration.outcome
@@ -329,11 +331,6 @@ class ExplorerNode(PatientLifecycleNode):
             estimates = self._open[exploration.exploration_id]
             state = self._stamped(exploration.state)
             goal.publish_feedback(action.Explore.Feedback(state=to_msg(state), texture=to_msg(estimates.texture)))
-
-    def _wait_for_final_estimates(self, exploration: Exploration, estimates: ExplorationEstimates) -> None:
-        if exploration.outcome.slid and not self._closing:
-            kinds = [kind for kind in ('texture', 'roughness') if self.count_publishers(kind)]
-            estimates.wait_until_final(kinds, self._estimate_timeout_s)
 
     def _offer(self, name: str, work: Callable[[], str], group: ReentrantCallbackGroup) -> None:
         """Offer a service without arguments; `work` returns a message, or raises an error."""
