@@ -267,39 +267,14 @@ def test_the_corner_exceeds_no_acceleration_and_keeps_the_speed(table):
 
 
 @pytest.mark.parametrize('heading', [0.0, 0.5, math.pi])
-def test_legs_that_leave_the_workspace_are_refused_with_the_longest_that_do_not(heading):
-    home = (0.1, 0.1, 0.01)
-    request = ExplorationRequest('cross_slide', distance_m=0.4, direction_rad=heading)
+def test_legs_that_leave_the_workspace_are_refused_with_the_longest_that_do_not(make_table, heading):
+    table = make_table(limits=SafetyLimits(x_low_m=-0.07, x_high_m=0.06, y_low_m=-0.05, y_high_m=0.08))
     with pytest.raises(MotionRefused, match='the length of each of two legs') as refused:
-        MOTIONS['cross_slide'](request, home, TouchParams(), SafetyLimits())
+        table.explore(ExplorationRequest('cross_slide', distance_m=0.4, direction_rad=heading))
     allowed = float(str(refused.value).partition('is at most ')[2].split()[0])
-    assert 0.0 < allowed < 0.3
-    fitting = ExplorationRequest('cross_slide', distance_m=allowed, direction_rad=heading)
-    MOTIONS['cross_slide'](fitting, home, TouchParams(), SafetyLimits())
-
-
-def test_the_longest_legs_stay_within_the_workspace(make_table):
-    table = make_table(limits=SafetyLimits(x_high_m=0.06, y_high_m=0.06))
-    with pytest.raises(MotionRefused) as refused:
-        MOTIONS['cross_slide'](
-            ExplorationRequest('cross_slide', distance_m=0.2), table.home, TouchParams(), table.limits
-        )
-    allowed = float(str(refused.value).partition('is at most ')[2].split()[0])
-    assert table.explore(ExplorationRequest('cross_slide', distance_m=allowed)).success
-
-
-@pytest.mark.parametrize('direction', [0.0, 0.5 * math.pi], ids=['first leg', 'second leg'])
-def test_a_stop_on_either_leg_lifts_and_aborts(table, direction):
-    def stop_on(state):
-        if state.phase is Phase.SLIDE and state.steady_s > 0 and abs(state.direction_rad - direction) < 0.01:
-            table.exploration.stop('enough')
-
-    keep = table.on_state
-    table.on_state = lambda state: (keep(state), stop_on(state))
-    outcome = table.explore(CROSS)
-    assert not outcome.success and outcome.message == 'enough'
-    assert table.phases[-2:] == [Phase.LIFT, Phase.ABORTED]
-    assert table.arm.state().force_n == 0
+    assert table.explore(ExplorationRequest('cross_slide', distance_m=allowed, direction_rad=heading)).success
+    with pytest.raises(MotionRefused):
+        table.explore(ExplorationRequest('cross_slide', distance_m=allowed + 0.001, direction_rad=heading))
 
 
 # --------------------
