@@ -3,6 +3,7 @@
 """The state machine and the limits: what the page shows is what the code does."""
 
 import re
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -43,12 +44,12 @@ HAPPENS = {
 
 
 @pytest.mark.parametrize('name', HAPPENS)
-def test_each_state_commands_what_its_row_says(make_table, monkeypatch, name):
-    table, seen = make_table(SimulatedArmParams(start_height_m=0.003)), []
+def test_each_state_commands_and_leads_to_what_its_row_says(make_table, monkeypatch, name):
+    table, seen, entered = make_table(SimulatedArmParams(start_height_m=0.003)), [], []
     phase, happens = HAPPENS[name]
     if phase:
         table.when[phase] = lambda: happens(table)
-    plan, timed_step = MOTIONS['linear_slide'], stages.Stage.timed_step
+    plan, timed_step, begin = MOTIONS['linear_slide'], stages.Stage.timed_step, stages.Stage.begin
     monkeypatch.setitem(MOTIONS, 'linear_slide', lambda *given: plan(*given).lift_first(lambda: True))
 
     def noted(stage, time_ns, arm):
@@ -58,10 +59,16 @@ def test_each_state_commands_what_its_row_says(make_table, monkeypatch, name):
         return command
 
     monkeypatch.setattr(stages.Stage, 'timed_step', noted)
+    monkeypatch.setattr(
+        stages.Stage, 'begin', lambda stage, *given: (entered.append(type(stage)), begin(stage, *given))
+    )
     table.explore(ExplorationRequest('linear_slide', distance_m=0.02))
     assert {state for state, _ in seen} >= {lift_first.Rise, lift_first.CalmDown, stages.LiftStage}
     assert [(state.__name__, said) for state, said in seen if said not in state.commands] == []
     assert {state for state, _ in seen} <= set(STATES)
+    order = [state for state in STATES if state is not lift_first.GoBack]
+    for before, after in pairwise(entered):
+        assert after is order[order.index(before) + 1] or after.__name__.removesuffix('Stage') in before.on_error
 
 
 def test_every_limit_of_the_table_is_a_name_of_the_code():

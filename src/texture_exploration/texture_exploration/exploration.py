@@ -31,36 +31,21 @@ def may_stop(estimate: TextureEstimate) -> bool:
 
 
 class ExplorationEstimates:
-    """The newest texture and roughness estimate of one exploration; safe for threads."""
+    """The newest texture and roughness estimate of one exploration."""
 
     def __init__(self, exploration_id: str) -> None:
         self.texture = TextureEstimate(0, exploration_id)
         self.roughness = RoughnessEstimate(0, exploration_id)
-        self._changed = threading.Condition()
-        self._cancelled = False
 
     def update(self, estimate: TextureEstimate | RoughnessEstimate) -> None:
         """Take a newer estimate."""
-        with self._changed:
-            if isinstance(estimate, TextureEstimate):
-                self.texture = estimate
-            else:
-                self.roughness = estimate
-            self._changed.notify_all()
+        if isinstance(estimate, TextureEstimate):
+            self.texture = estimate
+        else:
+            self.roughness = estimate
 
-    def wait_until_final(self, kinds: Collection[str], timeout_s: float) -> bool:
-        """Wait until the estimates of these kinds ('texture', 'roughness') are final; return whether they are."""
-        with self._changed:
-            self._changed.wait_for(lambda: self._cancelled or self._final(kinds), timeout_s)
-            return self._final(kinds)
-
-    def cancel(self) -> None:
-        """End the wait: no further estimate will arrive."""
-        with self._changed:
-            self._cancelled = True
-            self._changed.notify_all()
-
-    def _final(self, kinds: Collection[str]) -> bool:
+    def final(self, kinds: Collection[str]) -> bool:
+        """Return whether the estimates of these kinds ('texture', 'roughness') are final."""
         return all(getattr(self, kind).final for kind in kinds)
 
 
@@ -275,15 +260,18 @@ class Exploration:
 
     def _reason_to_abort(self, now_ns: int, arm: ArmState, relative: ArmState) -> tuple[ExplorationError, str] | None:
         """Return why it must end; a finger that was pushed out of the workspace may return first."""
-        workspace_violation = self._limits.workspace_violation(arm)
-        self._entered |= not workspace_violation
+        outside = self._limits.outside(arm.position)
+        self._entered |= not outside
         frozen = self._force_watch.frozen(arm, self._commanded)
         reasons = (
             (ExplorationError.ARM_FAULT, arm.unsafe),
             (ExplorationError.FORCE_LIMIT, self._guard.violation(relative, self.state.phase)),
             (ExplorationError.FORCE_SENSOR, frozen),
             (ExplorationError.NO_SURFACE, self._off_surface(arm)),
-            (ExplorationError.WORKSPACE, workspace_violation if self._entered else ''),
+            (
+                ExplorationError.WORKSPACE,
+                f'the finger left the workspace: {outside}' if outside and self._entered else '',
+            ),
             (ExplorationError.ARM_FAULT, self._arm.doubt()),
             (ExplorationError.NO_SIGNAL, self._signal_fault(self._listening)),
             (ExplorationError.TIMEOUT, self._overdue(now_ns)),

@@ -25,7 +25,7 @@ from texture_exploration.paths import (
     lead_m,
     ramps_m,
 )
-from texture_exploration.safety import SafetyLimits, stated
+from texture_exploration.safety import SafetyLimits
 from texture_exploration.touch import TouchParams
 
 # --------------------
@@ -119,9 +119,10 @@ def linear_slide(request: ExplorationRequest, home: Vector, touch: TouchParams, 
     ramps = ramps_m(request.speed_m_s, touch.ramp_s(request.speed_m_s))
     allowed = max(0.0, limits.free_distance_m(home, request.direction_rad) - ramps)
     if request.distance_m > allowed:
+        default = '' if given_m else ' (the default of the motion)'
         raise MotionRefused(
-            f'{request.motion}: distance_m is {stated(given_m, request.distance_m)}, which with {ramps:.3f} m for the '
-            f'ramps leaves the workspace; allowed in this direction is at most '
+            f'{request.motion}: distance_m is {request.distance_m:g}{default}, which with {ramps:.3f} m for the '
+            'ramps leaves the workspace; allowed in this direction is at most '
             f'{math.floor(allowed * 1000) / 1000:g} m {limits.limits_ahead(home, request.direction_rad)}',
             ExplorationError.OUTSIDE_WORKSPACE,
             'distance_m',

@@ -40,11 +40,6 @@ def shown(force_n: float) -> str:
     return f'{force_n:.2f}' if abs(force_n) <= MOST_FORCE_N else f'{force_n:.3g}'
 
 
-def stated(given: float, value: float) -> str:
-    """Return a number of a request as text; a `given` of 0 means the default of the motion."""
-    return f'{value:g}' if given else f'{value:g} (the default of the motion)'
-
-
 def _edge(value: float, which: str) -> Any:
     """Declare an edge of the workspace."""
     text = f'{which} coordinate of the workspace in the surface frame; leaving it aborts.'
@@ -126,23 +121,16 @@ class SafetyLimits:
         return min(max(value, low), high)
 
     def complete(self, request: ExplorationRequest, defaults: Mapping[str, float]) -> ExplorationRequest:
-        """Return a request with the motion's defaults for those of its numbers that are 0.
-
-        Raises
-        ------
-        MotionRefused
-            If a number is out of its range, or belongs to another motion.
-        """
+        """Return a request with the motion's defaults for those of its numbers that are 0, or refuse it."""
         numbers: dict[str, Any] = {
             name: getattr(request, name) or self.default(name, value) for name, value in defaults.items()
         }
-        given, request = request, replace(request, **numbers)
-        for name in defaults:
-            value, (low, high, unit) = getattr(request, name), self.range(name)
+        request = replace(request, **numbers)
+        for name, value in numbers.items():
+            low, high, unit = self.range(name)
             if not low <= value <= high:
-                shown = stated(getattr(given, name), value)
                 raise MotionRefused(
-                    f'{request.motion}: {name} is {shown}; allowed is {low:g} to {high:g} {unit}', field=name
+                    f'{request.motion}: {name} is {value:g}; allowed is {low:g} to {high:g} {unit}', field=name
                 )
         self.refuse_unused(request, RANGES.keys() - defaults.keys())
         if not abs(request.direction_rad) <= MAX_DIRECTION_RAD:
@@ -154,13 +142,7 @@ class SafetyLimits:
 
     @staticmethod
     def refuse_unused(request: ExplorationRequest, names: Iterable[str]) -> None:
-        """Refuse a request with a number that the motion does not use: it means another motion.
-
-        Raises
-        ------
-        MotionRefused
-            If such a number is not 0.
-        """
+        """Refuse a request with a number that the motion does not use: it means another motion."""
         given = sorted(name for name in names if getattr(request, name) != 0.0)
         if given:
             raise MotionRefused(
@@ -216,11 +198,6 @@ class SafetyLimits:
             f'under {normal_n:.2f} N: the finger met something, or its force is given in another frame; see '
             "'friction_limit' and 'tangential_floor_n'"
         )
-
-    def workspace_violation(self, arm: ArmState) -> str:
-        """Return in a sentence where the finger has left the workspace, '' if it has not."""
-        outside = self.outside(arm.position)
-        return f'the finger left the workspace: {outside}' if outside else ''
 
     def outside(self, position: Vector) -> str:
         """Return as text along which axes a position in the surface frame, m, is outside the workspace, or ''."""

@@ -67,6 +67,7 @@ from texture_exploration.touch import TouchParams
 STATIC_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 FEEDBACK_PERIOD_S = 0.05
 IDLE_PERIOD_S = 1.0
+ESTIMATE_PERIOD_S = 0.005
 PRESSED = (
     'the force sensor shows {:.1f} N, so the finger may press, as after an explorer that was killed: `texture lift` '
     'lifts it now, and the first exploration does so'
@@ -210,8 +211,6 @@ class ExplorerNode(PatientLifecycleNode):
     def shutdown(self) -> None:
         """Lift the finger, release the arm, end all waits of clients."""
         self._closing, current = True, self._explorer.current
-        for estimates in list(self._open.values()):
-            estimates.cancel()
         self._explorer.close()
         if current is not None:  # logged here, while this node still can
             outcome = current.outcome if current.ended.is_set() else STILL_MOVING
@@ -225,14 +224,11 @@ class ExplorerNode(PatientLifecycleNode):
     def _make_explorer(self, arm_name: str) -> Explorer:
         arm_class = find(ARMS, arm_name, 'arm')
         arm = arm_class(declare(self, arm_class.Params))
-        touch = declare(self, TouchParams, changeable=True)
-        limits = declare(self, SafetyLimits, changeable=True)
-        explorer = Explorer(arm, touch, limits, self._on_state, signal_fault=self._watch_signal())
-        explorer.patch = declare(self, SurfacePatch, changeable=True)
+        explorer = Explorer(arm, TouchParams(), SafetyLimits(), self._on_state, signal_fault=self._watch_signal())
         # Changed parameters hold from the next exploration on; those of arm and sensor are fixed.
-        on_change(self, TouchParams, partial(setattr, explorer, 'touch'))
-        on_change(self, SafetyLimits, partial(setattr, explorer, 'limits'))
-        on_change(self, SurfacePatch, partial(setattr, explorer, 'patch'))
+        for name, kind in (('touch', TouchParams), ('limits', SafetyLimits), ('patch', SurfacePatch)):
+            setattr(explorer, name, declare(self, kind, changeable=True))
+            on_change(self, kind, partial(setattr, explorer, name))
         return explorer
 
     def _watch_signal(self) -> Callable[[Listening], str]:
@@ -287,9 +283,11 @@ class ExplorerNode(PatientLifecycleNode):
         estimates = self._open[exploration.exploration_id] = ExplorationEstimates(exploration.exploration_id)
         try:
             wait(exploration)
-            if exploration.outcome.slid and not self._closing:
+            if exploration.outcome.slid:
                 kinds = [kind for kind in ('texture', 'roughness') if self.count_publishers(kind)]
-                estimates.wait_until_final(kinds, self._estimate_timeout_s)
+                end_s = time.monotonic() + self._estimate_timeout_s
+                while not (self._closing or estimates.final(kinds) or time.monotonic() > end_s):
+                    time.sleep(ESTIMATE_PERIOD_S)
         finally:
             del self._open[exploration.exploration_id]
         outcome = exploration.outcome
