@@ -3,6 +3,7 @@
 """The state machine and the limits: what the page shows is what the code does."""
 
 import re
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -80,14 +81,39 @@ def test_every_limit_of_the_table_is_a_name_of_the_code():
 
 
 def test_the_sentences_of_the_pages_hold_the_limits_of_the_code():
-    limit_n, stiff = safety.SafetyLimits().force_limit_n, touch.TouchParams(approach_stiffness_n_m=20000.0)
-    slow, slower = (f'{1e3 * stiff.slide_m_s(limit_n, delay_s):.0f} mm/s with' for delay_s in (0.02, 0.05))
-    assert f'exceed {touch.WALL_SHARE:g} times `force_limit_n`' in PAGE.read_text()
-    assert f'at 20 kN/m above {slow} 20 ms delay, above {slower} 50 ms' in PAGE.read_text()
-    assert f'(delay + {1e3 * touch.STEP_S:g} ms)' in PAGE.read_text()
-    for page in (PAGE, PAGE.with_name('safety.md')):
-        above = re.findall(r'above (\d+) N', page.read_text())
-        assert {*map(float, above)} == {limit_n}
+    limits, touching = safety.SafetyLimits(), touch.TouchParams()
+    stiff = replace(touching, approach_stiffness_n_m=20000.0)
+    slow, slower = (f'{1e3 * stiff.slide_m_s(limits.force_limit_n, delay_s):.0f} mm/s' for delay_s in (0.02, 0.05))
+    mean, speed, peak = touching.mean_force_fraction, touching.mean_speed_fraction, touching.peak_force_fraction
+    sentences = {
+        'motion.md': [
+            f'exceed {touch.WALL_SHARE:g} times `force_limit_n`',
+            f'at 20 kN/m above {slow} with 20 ms delay, above {slower} with 50 ms',
+            f'× (delay + {1e3 * touch.STEP_S:g} ms) × stiffness',
+            f'The gain is {force_control.GAIN_MARGIN:g} times lower',
+            f'no approach of {1e3 * force_control.SLOWEST_APPROACH_M_S:g} mm/s',
+            f'*waited {limits.contact_timeout_s} s for the force to settle*',
+        ],
+        'safety.md': [
+            f'at most `travel_speed_m_s` ({1e3 * touching.travel_speed_m_s:g} mm/s)',
+            f'repeated for {1e3 * limits.frozen_force_s:g} ms',
+            f'over {100 * limits.force_drift_fraction:g} % of the requested force',
+            f'above {safety.MOST_FORCE_N / 1e3:g} kN or {safety.MOST_M:g} m',
+            f'after `loop_delay_s` + {1e3 * force_control.LATE_S:g} ms',
+            f'or {100 * watches.OVERSHOOT:g} % overshoot before the slide',
+            f'below {touching.unheard_force_fraction:g} × the requested',
+            f'probe of {1e3 * lift_first.PROBE_M:g} mm at {1e3 * lift_first.PROBE_M_S:g} mm/s',
+            f'below {100 * touching.lost_force_fraction:g} % of the requested force',
+            f'under {100 * touching.stall_speed_fraction:g} % of the path',
+            f'mean force off by {100 * mean:g} %, speed by {100 * speed:g} %, peak by {100 * peak:g} %',
+            f'outside {safety.RANGES["speed_m_s"][0]:g} to {limits.max_speed_m_s:g} m/s, {limits.min_force_n:g} to '
+            f'{limits.max_force_n:g} N',
+        ],
+    }
+    for name, expected in sentences.items():
+        page = PAGE.with_name(name).read_text()
+        assert [sentence for sentence in expected if sentence not in page] == []
+        assert {*map(float, re.findall(r'above (\d+) N', page))} == {limits.force_limit_n}
 
 
 def test_each_step_of_the_table_is_the_period_of_the_explorer():
