@@ -10,6 +10,7 @@ import time
 from contextlib import closing
 from functools import partial
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 import rclpy
@@ -23,7 +24,7 @@ from std_srvs.srv import Trigger
 from texture_msgs import action, msg, srv
 from tf2_msgs.msg import TFMessage
 
-from texture_core.errors import ExplorationError, InvalidParameter
+from texture_core.errors import DeviceError, ExplorationError, InvalidParameter
 from texture_core.ros import ESTIMATE_QOS, SENSOR_QOS, STATE_QOS, WaitingExecutor, check_names, to_msg, to_ns
 from texture_core.ros_testing import LocalGraph, killed_on_error
 from texture_core.types import FingerReceiver, Phase, Rejection, TextureEstimate, quaternion_matrix
@@ -211,6 +212,30 @@ def test_a_request_that_cannot_be_meant_is_refused_before_anything_moves(world, 
     assert (response.error_code, response.lifted) == (Result.ERROR_INVALID_REQUEST, False)
     assert sentence in response.message
     assert not response.exploration_id
+
+
+@pytest.mark.parametrize(
+    ('error', 'code'),
+    [
+        (DeviceError('the arm was lost'), Result.ERROR_ARM_NOT_READY),
+        (InvalidParameter('of a planner'), Result.ERROR_INVALID_REQUEST),
+    ],
+)
+def test_an_arm_that_is_lost_or_a_planner_that_fails_at_a_request_does_not_end_the_node(
+    world, monkeypatch, error, code
+):
+    with monkeypatch.context() as patch:
+        patch.setattr(world.explorer._explorer, '_prepare', Mock(side_effect=error))
+        response = world.explored(world.call(**QUICK))
+    assert (response.error_code, response.message) == (code, str(error))
+    assert world.explored(world.call(**QUICK)).error_code == OK
+
+
+def test_an_estimate_that_is_inconsistent_does_not_end_the_node(world):
+    publisher = world.client.create_publisher(msg.TextureEstimate, 'texture', ESTIMATE_QOS)
+    world.until(publisher.get_subscription_count)
+    publisher.publish(msg.TextureEstimate(rejection=200))
+    assert world.explored(world.call(**QUICK)).error_code == OK
 
 
 def test_a_parameter_that_only_counts_at_the_start_is_read_only(world):

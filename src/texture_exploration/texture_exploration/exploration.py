@@ -104,6 +104,8 @@ def refusal(error: TextureError) -> ExplorationError:
     """Return the code of what `Explorer.begin` raises, or of a request that cannot be read."""
     if isinstance(error, MotionRefused):
         return error.error
+    if isinstance(error, DeviceError):
+        return ExplorationError.ARM_NOT_READY
     return ExplorationError.UNKNOWN_MOTION if isinstance(error, UnknownName) else ExplorationError.INVALID_REQUEST
 
 

@@ -28,7 +28,15 @@ from texture_msgs import action, msg, srv
 from tf2_msgs.msg import TFMessage
 
 from texture_core.config import find, param, parameters_of
-from texture_core.errors import DeviceError, ExplorationError, InvalidData, InvalidParameter, MotionRefused, UnknownName
+from texture_core.errors import (
+    DeviceError,
+    ExplorationError,
+    InvalidData,
+    InvalidParameter,
+    MotionRefused,
+    TextureError,
+    UnknownName,
+)
 from texture_core.ros import (
     ESTIMATE_QOS,
     SENSOR_QOS,
@@ -272,7 +280,7 @@ class ExplorerNode(PatientLifecycleNode):
             exploration_id = new_id(self.get_clock().now().nanoseconds, next(self._numbers), self._rng)
             self._check_clock()
             exploration = self._explorer.begin(exploration_id, from_msg(request))
-        except (MotionRefused, UnknownName, InvalidData) as error:
+        except TextureError as error:
             result.error_code, result.message = int(refusal(error)), str(error)
             result.field = 'motion' if isinstance(error, UnknownName) else error.field
             # Their numbers are NaN, not the zeros that a new message holds.
@@ -336,7 +344,7 @@ class ExplorerNode(PatientLifecycleNode):
         def answer(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             try:
                 response.message, response.success = work(), True
-            except (DeviceError, MotionRefused) as error:
+            except TextureError as error:
                 response.message = str(error)
             self.get_logger().info(f'{name[2:]}: {response.message}')
             return response
@@ -367,7 +375,11 @@ class ExplorerNode(PatientLifecycleNode):
         return f'{forgotten}; the surface stays as it is'
 
     def _on_estimate(self, message: msg.TextureEstimate | msg.RoughnessEstimate) -> None:
-        estimate: TextureEstimate | RoughnessEstimate = from_msg(message)
+        try:
+            estimate: TextureEstimate | RoughnessEstimate = from_msg(message)
+        except InvalidData as error:
+            self.get_logger().warning(f'an estimate was left out: {error}', throttle_duration_sec=1.0)
+            return
         estimates = self._open.get(estimate.exploration_id)
         if estimates is None:
             return
