@@ -42,11 +42,11 @@ class Stage:
         self.timeout_s = timeout_s
         self.goal = goal
         self.steady_s = 0.0
-        self._begin_ns = 0
+        self._begin_ns, self._begin_m = 0, 0.0
 
     def begin(self, time_ns: int, arm: ArmState) -> None:
-        """Note time and place of the start."""
-        self._begin_ns = time_ns
+        """Note time and height of the start."""
+        self._begin_ns, self._begin_m = time_ns, arm.position[2]
 
     def elapsed_s(self, time_ns: int) -> float:
         """Return the time since the start."""
@@ -115,19 +115,13 @@ class ApproachStage(Stage):
         self._touch = touch
         self._limits = limits
         self._force_n = force_n
-        self._start_m = 0.0
-
-    def begin(self, time_ns: int, arm: ArmState) -> None:
-        """Note the height at the start."""
-        super().begin(time_ns, arm)
-        self._start_m = arm.position[2]
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Go down, but no further than allowed."""
         if not arm.force_size_n <= self._touch.contact_force_n:
             self._check_normal(arm)
             return None
-        if self._start_m - arm.position[2] > self._touch.approach_travel_m:
+        if self._begin_m - arm.position[2] > self._touch.approach_travel_m:
             raise MotionAborted(
                 f'no surface within {self._touch.approach_travel_m:g} m below the start; '
                 "bring the finger closer or raise 'approach_travel_m'",

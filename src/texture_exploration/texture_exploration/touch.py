@@ -85,14 +85,8 @@ class TouchParams:
         """Return how fast the finger may come down to press with a force.
 
         An arm that loses its commands at the moment of contact keeps moving until its watchdog stops it. Until then
-        the force stays below `unheard_force_fraction` of the wanted one on a contact of `approach_stiffness_n_m`.
-
-        Parameters
-        ----------
-        force_n
-            The wanted force.
-        watchdog_s, delay_s
-            See `texture_exploration.arms.arm.ArmState`.
+        the force stays below `unheard_force_fraction` of the wanted one on a contact of `approach_stiffness_n_m`. For
+        `watchdog_s` and `delay_s` see `texture_exploration.arms.arm.ArmState`.
         """
         heard_m_s = stopping_m_s(IMPACT * force_n, self.approach_stiffness_n_m, stop_s(delay_s))
         allowed_n, unheard_s = max(self.unheard_force_fraction * force_n, HARMLESS_N), watchdog_s + REACTION_S
