@@ -14,7 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from texture_core.errors import DeviceError, ExplorationError, MotionRefused, TextureError, UnknownName
+from texture_core.errors import (
+    CommandRefused,
+    DeviceError,
+    ExplorationError,
+    MotionRefused,
+    TextureError,
+    UnknownName,
+)
 from texture_core.types import ENDED, ExplorationRequest, ExplorationState, Phase, RoughnessEstimate, TextureEstimate
 from texture_exploration.arms.arm import Arm, ArmCommand, ArmState, SurfaceFrame
 from texture_exploration.guards import GAP_NS, WITHOUT_GAPS, ForceGuard, ForceWatch, Listening, sound
@@ -163,26 +170,28 @@ class Exploration:
         try:
             while not self._tick():
                 pace()
+        except CommandRefused as error:  # the arm obeys
+            self._escape(ExplorationError.ARM_FAULT, str(error), pace)
         except DeviceError as error:
             self._give_up(ExplorationError.ARM_FAULT, f'{error}; the finger was not lifted')
         except Exception as error:
-            self._escape(error, pace)
+            self._escape(ExplorationError.INTERNAL, f'internal error, {type(error).__name__}: {error}', pace)
         finally:
             with contextlib.suppress(DeviceError):
                 self._arm.stop()
         return self.outcome
 
-    def _escape(self, error: Exception, pace: Callable[[], None]) -> None:
+    def _escape(self, error: ExplorationError, reason: str, pace: Callable[[], None]) -> None:
         """Command zero and lift by a separate stage without the failed part; report it."""
         LOGGER.exception('an exploration failed')
-        reason, lifted = f'internal error, {type(error).__name__}: {error}'[:MOST_CHARACTERS], False
+        reason, lifted = reason[:MOST_CHARACTERS], False
         try:
             self._arm.stop()
             lifted = self._lift_alone(pace)
         except Exception as second:
             reason += f'; then {type(second).__name__}: {second}'[:MOST_CHARACTERS]
         how = 'see the log' if lifted else 'the finger was not lifted'
-        self.outcome = ExplorationOutcome(ExplorationError.INTERNAL, f'{reason}; {how}', self._slid, lifted)
+        self.outcome = ExplorationOutcome(error, f'{reason}; {how}', self._slid, lifted)
         with contextlib.suppress(Exception):  # the receiver of the states may be the failed part
             self._report(self._clock(), Phase.ABORTED, progress=self.state.progress)
 
