@@ -14,14 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from texture_core.errors import (
-    CommandRefused,
-    DeviceError,
-    ExplorationError,
-    MotionRefused,
-    TextureError,
-    UnknownName,
-)
+from texture_core.errors import CommandRefused, DeviceError, ExplorationError, MotionRefused, TextureError, UnknownName
 from texture_core.types import ENDED, ExplorationRequest, ExplorationState, Phase, RoughnessEstimate, TextureEstimate
 from texture_exploration.arms.arm import Arm, ArmCommand, ArmState, SurfaceFrame
 from texture_exploration.guards import GAP_NS, WITHOUT_GAPS, ForceGuard, ForceWatch, Listening, sound

@@ -29,7 +29,6 @@ from tf2_msgs.msg import TFMessage
 
 from texture_core.config import find, param, parameters_of
 from texture_core.errors import (
-    DeviceError,
     ExplorationError,
     InvalidData,
     InvalidParameter,
@@ -210,7 +209,7 @@ class ExplorerNode(PatientLifecycleNode):
         """Return whether the arm allowed it; if not, log why."""
         try:
             step()
-        except (DeviceError, MotionRefused) as error:
+        except TextureError as error:
             more = '; the next request tries again' if self._autostart else ''
             self.get_logger().error(f'{error}{more}')
             return False
