@@ -28,10 +28,18 @@ from texture_exploration.paths import (
 from texture_exploration.safety import SafetyLimits
 from texture_exploration.touch import TouchParams
 
+# The numbers that each motion takes, with their defaults: the form of the dashboard.
+DEFAULTS: Mapping[str, Mapping[str, float]] = {
+    'linear_slide': {'speed_m_s': 0.05, 'force_n': 1.0, 'distance_m': 0.1},
+    'circular': {'speed_m_s': 0.1, 'force_n': 1.0, 'radius_m': 0.02, 'turns': 2.0},  # ETS: "a radius of about 2" cm
+    'cross_slide': {'speed_m_s': 0.0255, 'force_n': 1.5, 'distance_m': 0.05},  # Hu et al. 2014, section 5.1; no length
+    # A stroke is about what a fingertip reaches; duration: Kaboli et al. 2015.
+    'in_hand_sliding': {'speed_m_s': 0.02, 'force_n': 1.0, 'distance_m': 0.02, 'duration_s': 2.0},
+    'in_hand_random': {'speed_m_s': 0.02, 'force_n': 1.0, 'distance_m': 0.02, 'duration_s': 2.0},
+}
+
 # --------------------
 # Slide in a circle at constant speed and force.
-
-CIRCULAR_DEFAULTS = {'speed_m_s': 0.1, 'force_n': 1.0, 'radius_m': 0.02, 'turns': 2.0}  # ETS: "a radius of about 2" cm
 
 
 def circular(request: ExplorationRequest, home: Vector, touch: TouchParams, limits: SafetyLimits) -> Motion:
@@ -39,7 +47,7 @@ def circular(request: ExplorationRequest, home: Vector, touch: TouchParams, limi
 
     The finger comes down before that angle, and gains its speed on the circle.
     """
-    request = limits.complete(request, CIRCULAR_DEFAULTS)
+    request = limits.complete(request, DEFAULTS['circular'])
     radius, speed = request.radius_m, request.speed_m_s
     fastest = math.sqrt(limits.max_turning_m_s2 * radius)
     if speed > fastest:
@@ -65,9 +73,6 @@ def circular(request: ExplorationRequest, home: Vector, touch: TouchParams, limi
 # --------------------
 # Rub to and fro with a fingertip, as the free fingers of a hand do on an object that the others hold.
 
-# A stroke is about what a fingertip reaches; duration: Kaboli et al. 2015.
-IN_HAND_SLIDING_DEFAULTS = {'speed_m_s': 0.02, 'force_n': 1.0, 'distance_m': 0.02, 'duration_s': 2.0}
-
 
 def in_hand_sliding(request: ExplorationRequest, home: Vector, touch: TouchParams, limits: SafetyLimits) -> Motion:
     """Plan strokes of `distance_m` to and fro, for `duration_s`.
@@ -89,7 +94,7 @@ def _strokes(
     request: ExplorationRequest, home: Vector, touch: TouchParams, limits: SafetyLimits, least_fraction: float
 ) -> Motion:
     """Plan strokes; the shortest is `least_fraction` of the longest."""
-    request = limits.complete(request, IN_HAND_SLIDING_DEFAULTS)
+    request = limits.complete(request, DEFAULTS['in_hand_sliding'])
     speed, longest_m = request.speed_m_s, request.distance_m
     turn_s = touch.ramp_s(2 * speed)
     least_m = (ramps_m(speed, touch.ramp_s(speed)) + speed * turn_s) / least_fraction
@@ -110,12 +115,10 @@ def _strokes(
 # --------------------
 # Slide in a straight line at constant speed and force.
 
-LINEAR_SLIDE_DEFAULTS = {'speed_m_s': 0.05, 'force_n': 1.0, 'distance_m': 0.1}
-
 
 def linear_slide(request: ExplorationRequest, home: Vector, touch: TouchParams, limits: SafetyLimits) -> Motion:
     """Plan a slide of `distance_m` at constant speed, with a ramp before and after it."""
-    given_m, request = request.distance_m, limits.complete(request, LINEAR_SLIDE_DEFAULTS)
+    given_m, request = request.distance_m, limits.complete(request, DEFAULTS['linear_slide'])
     ramps = ramps_m(request.speed_m_s, touch.ramp_s(request.speed_m_s))
     allowed = max(0.0, limits.free_distance_m(home, request.direction_rad) - ramps)
     if request.distance_m > allowed:
@@ -134,16 +137,10 @@ def linear_slide(request: ExplorationRequest, home: Vector, touch: TouchParams, 
 # --------------------
 # Slide along one direction, go round a corner, and slide along the direction at right angles to it.
 
-CROSS_SLIDE_DEFAULTS = {
-    'speed_m_s': 0.0255,
-    'force_n': 1.5,
-    'distance_m': 0.05,
-}  # Hu et al. 2014, section 5.1; no length
-
 
 def cross_slide(request: ExplorationRequest, home: Vector, touch: TouchParams, limits: SafetyLimits) -> Motion:
     """Plan two slides of `distance_m` at right angles in one contact: along `direction_rad`, then to the left of it."""
-    request = limits.complete(request, CROSS_SLIDE_DEFAULTS)
+    request = limits.complete(request, DEFAULTS['cross_slide'])
     speed, direction = request.speed_m_s, request.direction_rad
     corner_s = touch.ramp_s(QUARTER_RAD * speed)  # the arc of a quarter turn is as steep as a ramp of this speed
     extra_m = ramps_m(speed, touch.ramp_s(speed)) + speed * (corner_s + STEADY_S)
@@ -172,13 +169,4 @@ MOTIONS: Mapping[str, Planner] = {
     'cross_slide': cross_slide,  # Hu et al. 2014: along x and along y
     'in_hand_sliding': in_hand_sliding,  # Kaboli et al. 2015
     'in_hand_random': in_hand_random,  # its future work: random exploratory movements
-}
-
-# The numbers that each motion takes, with their defaults: the form of the dashboard.
-DEFAULTS: Mapping[str, Mapping[str, float]] = {
-    'linear_slide': LINEAR_SLIDE_DEFAULTS,
-    'circular': CIRCULAR_DEFAULTS,
-    'cross_slide': CROSS_SLIDE_DEFAULTS,
-    'in_hand_sliding': IN_HAND_SLIDING_DEFAULTS,
-    'in_hand_random': IN_HAND_SLIDING_DEFAULTS,
 }
