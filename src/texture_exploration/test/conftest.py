@@ -51,6 +51,8 @@ class Table:
         self.late_ns = 0  # delay of the states of the arm
         self.signal_fault = no_signal_watch
         self.when = {}  # what to do at the third state of a phase
+        self.at_each_step = lambda: None
+        self.pressed = []  # time, ns, and true force, N, of each step
 
     def sleep(self):
         """Let the whole machine sleep: time goes on, arm and exploration do not."""
@@ -59,10 +61,17 @@ class Table:
     def pace(self):
         if self.asleep_ns:
             self.now_ns, self.asleep_ns = self.now_ns + self.asleep_ns, 0
-            return
-        for _ in range(2):
-            self.now_ns += ARM_STEP_NS
-            self.arm.step(ARM_STEP_NS * 1e-9)
+        else:
+            for _ in range(2):
+                self.now_ns += ARM_STEP_NS
+                self.arm.step(ARM_STEP_NS * 1e-9)
+        self.pressed.append((self.now_ns, self.arm.true_force_n))
+        self.at_each_step()
+
+    @property
+    def largest_n(self):
+        """The largest true force."""
+        return max(force_n for _, force_n in self.pressed)
 
     def explore(self, request=LINEAR):
         motion = MOTIONS[request.motion](request, self.home, self.touch, self.limits)

@@ -283,7 +283,7 @@ def test_a_controller_that_listens_without_moving_the_arm_is_named_and_recovers(
 
 
 @pytest.mark.parametrize('held_up_s', [0.5, 60.0])
-def test_an_arm_that_is_held_up_in_the_slide_lifts_the_finger_if_it_can(noisy, held_up_s):
+def test_an_arm_that_is_held_up_in_the_slide_lifts_the_finger_if_it_can(noisy, held_up_s, monkeypatch):
     """As by a controller that gets no computing time: it stands, and may obey again."""
     until_ns, follow = [], noisy.machine.command
 
@@ -295,7 +295,8 @@ def test_an_arm_that_is_held_up_in_the_slide_lifts_the_finger_if_it_can(noisy, h
             until_ns.append(noisy.now_ns + round(held_up_s * 1e9))
             noisy.machine.command = stand
 
-    patient = TouchParams(stall_s=5.0, lost_contact_s=5.0)
+    monkeypatch.setattr(TouchParams, 'stall_s', 5.0)
+    patient = TouchParams(lost_contact_s=5.0)
     outcome = noisy.explore(replace(PRESS, speed_m_s=0.05), touch=patient, on_slide=hold_up)
     assert 'mm commanded' in outcome.message
     assert outcome.lifted is (held_up_s < 1.0)

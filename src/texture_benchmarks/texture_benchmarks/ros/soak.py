@@ -38,6 +38,7 @@ from texture_core.ros import ESTIMATE_QOS, FEATURE_QOS, to_ns
 from texture_core.ros_testing import NodeProcess
 from texture_core.types import NANOSECONDS, ExplorationRequest, ExplorationState, Phase
 from texture_evaluation.train import train_from_bags
+from texture_exploration.safety import SafetyLimits
 from texture_simulation.offline import SlidePlan, write_simulated
 from texture_simulation.scene import load_scene
 
@@ -103,7 +104,8 @@ EMULATED = {'accept_no_timeout': True, 'accept_shared_group': True, 'approach_st
 COUNTERS = {'sensor': 'lost', 'feature_extractor': 'lost_samples', 'classifier': 'lost_vectors'}
 ANSWERS_S, RESPAWN_S, SETTLED_S, POLL_S = 120.0, 0.2, 1.0, 0.05
 ATTEMPTS = 3  # a busy machine may abort before the slide, or slide too slowly for a success
-HUNG_S, BACK_S, LIMIT_N, ABOVE_S, FREE_N, GROWTH, LOOKS = 60.0, 60.0, 10.0, 0.1, 0.2, 0.01, 50
+HUNG_S, BACK_S, ABOVE_S, FREE_N, GROWTH, LOOKS = 60.0, 60.0, 0.1, 0.2, 0.01, 50
+LIMIT_N = SafetyLimits().force_limit_n
 
 # --------------------
 # What is recorded, and what must hold.

@@ -193,7 +193,7 @@ def requests_of(options: argparse.Namespace) -> list[ExplorationRequest]:
     if options.preset:
         if options.repeats < 0:
             raise InvalidParameter(f'--repeats is {options.repeats}; 1 or more rounds are needed')
-        return [replace(one, surface=options.surface) for one in load_preset(options.preset).all(options.repeats)]
+        return [replace(one, surface=options.surface) for one in load_preset(options.preset, options.repeats)]
     find(MOTIONS, options.motion, 'motion')  # refused before the wait for an explorer
     numbers = {field: getattr(options, option) for option, field, _, _ in NUMBERS}
     x_m, y_m = options.start or (0.0, 0.0)
