@@ -1,5 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
+import json
 import os
 import re
 import signal
@@ -11,12 +12,17 @@ import pytest
 from texture_benchmarks import catalogue
 from texture_benchmarks.catalogue import BENCHMARKS, LONG, run_all
 from texture_benchmarks.commands import benchmark as command
+from texture_benchmarks.generalisation import generalisation_chart
+from texture_benchmarks.overview import computing_chart, sliding_chart
+from texture_benchmarks.scale import scale_chart
+from texture_benchmarks.scenes import ablation_chart
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult
 from texture_bringup.command import main
 from texture_core.errors import InvalidData
 
 pytestmark = pytest.mark.ros
 
+PAGES = Path(__file__).resolve().parents[3] / 'docs'
 NAMES = ('good', 'killed', 'bad', 'clock', 'missing')
 
 
@@ -36,12 +42,29 @@ def test_one_that_fails_or_is_killed_stops_no_other(tmp_path: Path) -> None:
 
 def test_every_benchmark_has_its_line_on_the_page_and_what_is_scheduled_exists() -> None:
     assert set(LONG) < set(BENCHMARKS)
-    page = (Path(__file__).resolve().parents[3] / 'docs' / 'benchmarks.md').read_text()
-    assert re.findall(r'^\| `(\w+)` \|', page, re.MULTILINE) == list(BENCHMARKS)
+    page = (PAGES / 'benchmarks.md').read_text()
+    assert re.findall(r'^\| `([\w-]+)` \|', page, re.MULTILINE) == list(BENCHMARKS)
+
+
+@pytest.mark.parametrize(
+    ('name', 'draw', 'keys'),
+    [
+        ('generalisation', generalisation_chart, ()),
+        ('overview', sliding_chart, ()),
+        ('overview', computing_chart, ()),
+        ('scale', scale_chart, ('textures, default',)),
+        ('scenes', ablation_chart, ()),
+    ],
+)
+def test_the_charts_of_the_pages_can_be_drawn_from_the_stored_figures(name, draw, keys, tmp_path: Path) -> None:
+    numbers = json.loads((PAGES / 'charts' / f'{name}.json').read_text(encoding='utf-8'))['numbers']
+    for key in keys:
+        numbers = numbers[key]
+    assert draw(numbers, tmp_path / 'chart.png').is_file()
 
 
 def good(benchmark: BenchmarkOptions) -> BenchmarkResult:
-    return BenchmarkResult('good', 'nothing', 'none', 'none', {})
+    return BenchmarkResult('none', 'none', {})
 
 
 def bad(benchmark: BenchmarkOptions) -> BenchmarkResult:

@@ -9,21 +9,26 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
-from texture_benchmarks.study import BenchmarkOptions, accuracy_interval, finished_forked, imported, map_forked
+from texture_benchmarks.study import BenchmarkOptions, accuracy_interval, imported, map_forked, resumed
 from texture_core.errors import InvalidData
 
 
-def test_a_job_that_fails_or_lasts_too_long_leaves_the_others(capsys) -> None:
+def test_a_part_that_fails_or_lasts_too_long_leaves_the_others_and_none_is_computed_twice(tmp_path, capsys) -> None:
     def work(job):
         if job == 'waits':
             threading.Event().wait()
         return 1 / job
 
-    found = dict(finished_forked(work, [1, 0, 'waits', 2], workers=3, budget_s=5.0))
-    assert found == {1: 1.0, 2: 0.5}
+    options = BenchmarkOptions(tmp_path, workers=3, budget_s=5.0)
+    jobs = {'one': 1, 'zero': 0, 'late': 'waits', 'two': 2}
+    assert resumed(work, jobs, tmp_path / 'parts.jsonl', options) == {'one': 1.0, 'two': 0.5}
     printed = capsys.readouterr().out
-    assert '0 failed: ZeroDivisionError' in printed
+    assert 'zero failed: ZeroDivisionError' in printed
     assert 'ended after 5 s' in printed
+    found = resumed(lambda _job: 'again', jobs, tmp_path / 'parts.jsonl', options)
+    assert found == {'one': 1.0, 'zero': 'again', 'late': 'again', 'two': 0.5}
+    assert '2 parts are of an earlier run' in capsys.readouterr().out
+    assert not (tmp_path / 'parts.jsonl').exists()
 
 
 @pytest.mark.parametrize('data', [True, False])

@@ -33,7 +33,7 @@ BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
     'generalisation': generalisation.run,  # against the distance from what was trained: place, day, finger, run
     'papers': papers.run,  # the papers' recipes on recordings, at the same and at another place of a track
     'trust': trust.run,  # where recognition fails: how slides end under disturbances and over unknown materials
-    'roughness': latency.run_roughness,  # from window to grade
+    'roughness-latency': latency.run_roughness,  # from window to grade
     'learning': learning.run,  # textures added slide by slide, and slides needed with chosen motions
     'motion': motion.run,  # force, speed and circle by robot and surface; where force control is stable
     'scenes': scenes.run,  # cost of simulated slides and devices; what each term of a scene contributes
@@ -46,10 +46,11 @@ Act = Callable[[str], int]  # runs a study by its name and returns the exit code
 
 def run_benchmark(name: str, options: BenchmarkOptions) -> tuple[BenchmarkResult, Path]:
     """Run one study; return its result and the JSON file, with the charts next to it."""
-    result = find(BENCHMARKS, name, 'benchmark')(options)
+    run = find(BENCHMARKS, name, 'benchmark')
+    result = run(options)
     if options.quick:
         result = replace(result, data=f'REDUCED, not for publishing; part of: {result.data}')
-    return result, result.write(options.out)
+    return result, result.write(options.out, name, run.__doc__)
 
 
 def run_all(names: Sequence[str], act: Act) -> dict[str, int]:

@@ -1,32 +1,19 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Explorations in virtual time, on independent physics: how hard a finger presses, and how each one ends.
-
-Needs neither ROS nor recorded data: `python -m texture_benchmarks.force_trials --out FOLDER` runs the whole sweep on
-all cores, and `texture benchmark motion --data FOLDER` makes the tables and charts of it.
-"""
+"""Explorations in virtual time, on independent physics: how hard a finger presses, and how each one ends."""
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
-import multiprocessing
-import os
-import random
-import sys
 import threading
-import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from itertools import product
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from texture_core.errors import ExplorationError, InvalidData, TextureError
+from texture_core.errors import ExplorationError, TextureError
 from texture_core.types import ExplorationRequest, ExplorationState, Phase
 from texture_exploration.arms.arm import Vector
 from texture_exploration.arms.ros_controllers import RosControllersArm
@@ -380,7 +367,7 @@ def explored(trial: ForceTrial) -> TrialEnd:
 STIFFNESSES_N_M = (200.0, 600.0, 2000.0, 6000.0, 20000.0)
 DELAYS_S = (0.0, 0.008, 0.02, 0.05)
 NOISES_N = (0.003, 0.01, 0.02)
-SEEDS = 20
+SEEDS = 5  # of the noise
 GAPS_M = (0.001, 0.002, 0.004, 0.008, 0.012)
 BREAKS_S = (0.1, 0.3, 0.7, 2.0, 5.0)
 FOUND_S = (0.05, 0.5, 2.0, 6.0)
@@ -390,7 +377,7 @@ FIELDS = [f'{field} {index}' for field, size in (('force', 3), ('place', 3), ('r
 BAD = [f'{field} {value}' for field, value in product(FIELDS, ('nan', 'inf', '1e308'))]
 
 
-def sweep(seeds: int, quick: bool = False) -> Iterator[ForceTrial]:
+def sweep(seeds: int, quick: bool) -> Iterator[ForceTrial]:
     """Return the trials of the sweep; `seeds` of the noise for each."""
     stiffnesses = STIFFNESSES_N_M[::2] if quick else STIFFNESSES_N_M
     delays, noises = (DELAYS_S[1::2], NOISES_N[::2]) if quick else (DELAYS_S, NOISES_N)
@@ -418,29 +405,10 @@ def sweep(seeds: int, quick: bool = False) -> Iterator[ForceTrial]:
 Trials = list[tuple[ForceTrial, TrialEnd]]
 
 
-def ran(trials: Sequence[ForceTrial], budget_s: float = math.inf) -> Trials:
-    """Run trials on all cores, in an order drawn at random; return those that began within the time, in their order."""
-    end_s = time.monotonic() + budget_s
-    jobs = [(place, trial, end_s) for place, trial in enumerate(trials)]
-    random.Random(0).shuffle(jobs)
-    context = multiprocessing.get_context('fork')
-    with ProcessPoolExecutor(len(os.sched_getaffinity(0)), context) as pool:
-        done = sorted(filter(None, pool.map(_in_time, jobs)))
-    return [(trials[place], end) for place, end in done]
-
-
-def _in_time(job: tuple[int, ForceTrial, float]) -> tuple[int, TrialEnd] | None:
-    place, trial, end_s = job
-    return (place, explored(trial)) if time.monotonic() < end_s else None
-
-
 def row(trials: Trials) -> dict[str, Any]:
     """Return the figures of one row of the table."""
     ends = [end for _, end in trials]
     good = [(trial, end) for trial, end in trials if end.end == 'success']
-    reasons: dict[str, int] = {}
-    for end in ends:
-        reasons[end.end] = reasons.get(end.end, 0) + 1
     return {
         'trials': len(ends),
         'normal_n': max(end.normal_n for end in ends),
@@ -450,67 +418,5 @@ def row(trials: Trials) -> dict[str, Any]:
         'overshoot_of_success': max((end.normal_n / trial.wanted_n - 1.0 for trial, end in good), default=0.0),
         'internal': sum(not end.named for end in ends),
         'moved_after_break': sum(end.moved_after_break for end in ends),
-        'ends': dict(sorted(reasons.items(), key=lambda reason: -reason[1])),
+        'ends': dict(Counter(end.end for end in ends).most_common()),
     }
-
-
-def by_name(trials: Trials) -> dict[str, Trials]:
-    """Return the trials of each row of the table."""
-    rows: dict[str, Trials] = {}
-    for trial, end in trials:
-        rows.setdefault(trial.name, []).append((trial, end))
-    return rows
-
-
-# --------------------
-# The whole sweep on a machine without ROS, and its file.
-
-TRIALS_FILE = 'motion_trials.json'
-
-
-class Sweep(NamedTuple):
-    """Trials of a sweep, of how many that were planned, with how many seeds of the noise."""
-
-    seeds: int
-    planned: int
-    trials: Trials
-
-    def write(self, folder: Path) -> None:
-        """Write them into a folder."""
-        folder.mkdir(parents=True, exist_ok=True)
-        content = self._asdict() | {'trials': [[*trial, *end] for trial, end in self.trials]}
-        (folder / TRIALS_FILE).write_text(json.dumps(content) + '\n', encoding='utf-8')
-
-
-def read_sweep(folder: Path) -> Sweep:
-    """Return the sweep that was written into a folder."""
-    path, size = folder / TRIALS_FILE, len(ForceTrial._fields)
-    try:
-        content = json.loads(path.read_text(encoding='utf-8'))
-        trials = [(ForceTrial(*values[:size]), TrialEnd(*values[size:])) for values in content['trials']]
-        return Sweep(content['seeds'], content['planned'], trials)
-    except (OSError, ValueError, TypeError, LookupError) as error:
-        raise InvalidData(f"'{path}' holds no trials ({error}); let force_trials write it") from error
-
-
-def main() -> None:
-    """Run the sweep, write its trials, and print the table; exit with 1 if not all of them were run."""
-    parser = argparse.ArgumentParser(description='Explore in virtual time: the whole sweep, or what the time allows.')
-    parser.add_argument('--out', type=Path, required=True, help=f'folder for {TRIALS_FILE}')
-    parser.add_argument('--seeds', type=int, default=SEEDS, help='noise drawn so often for each trial')
-    parser.add_argument('--budget', type=float, default=math.inf, help='seconds after which no further trial begins')
-    parser.add_argument('--quick', action='store_true', help='fewer stiffnesses, delays and fields')
-    given = parser.parse_args()
-    begin_s, planned = time.monotonic(), list(sweep(given.seeds, given.quick))
-    result = Sweep(given.seeds, len(planned), ran(planned, given.budget))
-    result.write(given.out)
-    for name, trials in by_name(result.trials).items():
-        figures = {key: round(value, 3) if isinstance(value, float) else value for key, value in row(trials).items()}
-        print(f'{name}: {json.dumps(figures)}')
-    done, took_s = len(result.trials), time.monotonic() - begin_s
-    print(f'{done} of {len(planned)} trials in {took_s:.0f} s on {len(os.sched_getaffinity(0))} cores')
-    sys.exit(done < len(planned))
-
-
-if __name__ == '__main__':
-    main()

@@ -294,8 +294,6 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     with imported(options, 'ntp21') as bags:
         chosen = chosen_motions(options, bags)
     return BenchmarkResult(
-        name='learning',
-        measured=run.__doc__,
         data=f'BioTac vibration, {len(labels)} materials (github dexrob/BioTac_slide_20_50, Gao et al. 2020), recipe '
         f'{RECIPE} calibrated in {FOLDS} parts',
         split=f'{len(runs)} draws of {len(draws[0])} new materials: trained on slides '

@@ -5,25 +5,15 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from texture_benchmarks.force_trials import (
-    LIMIT_N,
-    SEEDS,
-    TRIALS_FILE,
-    Sweep,
-    Trials,
-    by_name,
-    ran,
-    read_sweep,
-    row,
-    sweep,
-)
-from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult
+from texture_benchmarks.force_trials import LIMIT_N, SEEDS, TrialEnd, Trials, explored, row, sweep
+from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, resumed
 from texture_core.types import Array
 from texture_evaluation.charts import COLOURS, chart
 from texture_exploration.force_control import (
@@ -128,6 +118,7 @@ ARM_RATE_HZ = 250.0
 STIFFNESSES_N_M = (100.0, 1e3, 1e4, 1e5)
 DELAYS_S = tuple(float(delay) for delay in np.linspace(0.0, 0.02, 21))
 QUICK_DELAYS_S = (0.0, 0.008, 0.02)
+FINISHED = 'motion.jsonl'  # a line for each trial, as it is finished
 
 
 def run(options: BenchmarkOptions) -> BenchmarkResult:
@@ -136,25 +127,21 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     A late integrator on a spring with friction, by an arm of ROS controllers that holds the last velocity: stiffness
     of 0.2 to 20 kN/m, delay of 0 to 50 ms, noise of 3 to 20 mN; a wall, wrong signs and axes, a surface upside down 1
     to 12 mm away; in each phase non-finite samples, broken links and a second explorer. Largest true forces of
-    each kind of trial, the most time above 10 N, and how the trials ended. Trials that `force_trials` has written
-    into the folder of recorded data are taken from there.
+    each kind of trial, the most time above 10 N, and how the trials ended.
     """
-    if options.data is not None and (options.data / TRIALS_FILE).is_file():
-        result = read_sweep(options.data)
-    else:
-        seeds = 1 if options.quick else SEEDS
-        planned = list(sweep(seeds, options.quick))
-        result = Sweep(seeds, len(planned), ran(planned))
-    rows = by_name(result.trials)
+    seeds = 1 if options.quick else SEEDS
+    planned = {', '.join(map(str, trial)): trial for trial in sweep(seeds, options.quick)}
+    ended = resumed(explored, planned, options.out / FINISHED, options)
+    rows: defaultdict[str, Trials] = defaultdict(list)
+    for name, end in ended.items():
+        rows[planned[name].name].append((planned[name], TrialEnd(*end)))
     limit = stability_chart(STIFFNESSES_N_M, QUICK_DELAYS_S if options.quick else DELAYS_S)
     return BenchmarkResult(
-        name='motion',
-        measured=run.__doc__,
         data='virtual arm and surface, in virtual time',
         split='none: nothing is trained',
         numbers={
-            'seeds': result.seeds,
-            'planned': result.planned,
+            'seeds': seeds,
+            'planned': len(planned),
             'rows': {name: row(trials) for name, trials in rows.items()},
             'border_error': float(np.abs(limit['simulated'] / limit['predicted'] - 1).max()),
         },

@@ -106,8 +106,6 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         latency_us = {'median': round(median, 1), 'p99': round(p99, 1)}
         numbers[job.channels][job.name] = {**figures, 'latency_us': latency_us}
     return BenchmarkResult(
-        name='overview',
-        measured=run.__doc__,
         data=DATA_SET,
         split=SPLIT,
         numbers=numbers,

@@ -191,8 +191,6 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     with single_blas_thread():
         rows = [map_forked(measure, [labels])[0] for labels in counts]  # each alone, for its memory
     return BenchmarkResult(
-        name='scale',
-        measured=run.__doc__,
         data='simulated at the level of features: centres of textures, slides and windows drawn from normal '
         f'distributions with the covariances of recorded ones; covariances from {DATA["biotac20"]}, all slides, '
         'windows 0.25 s apart; no augmented copies',

@@ -420,8 +420,6 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         'added': added,
     }
     return BenchmarkResult(
-        name='scenes',
-        measured=run.__doc__,
         data='simulated scenes; slides of 2 and 3 s are cut to 1 s; terms that left a scene are put back for it',
         split=f'{size.slides} slides for training (jamali a third, sticky a fifth), others for test, '
         f"{size.repeats} repetitions; the papers' methods on {size.paper_repeats} sets of slides as many as in the "

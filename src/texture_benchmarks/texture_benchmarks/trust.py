@@ -279,8 +279,6 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     chart_path = options.out / 'failures.png'
     charts = () if options.quick else (failures_chart(numbers, chart_path),)
     return BenchmarkResult(
-        name='trust',
-        measured=run.__doc__,
         data=f'simulated scene {SCENE}' if options.quick else DISTURBED_DATA,
         split=SPLIT,
         numbers=numbers,

@@ -33,15 +33,16 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument('--quick', action='store_true', help='few slides, or simulated ones; not for publishing')
     parser.add_argument(
-        '--workers', type=int, default=0, metavar='N', help='processes of `generalisation`; 0: all cores'
+        '--workers', type=int, default=0, metavar='N', help='processes of `generalisation`, `motion`; 0: all cores'
     )
     parser.add_argument(
         '--minutes',
         type=float,
         default=math.inf,
         metavar='MIN',
-        help='after which `generalisation` ends with what it has',
+        help='after which `generalisation` and `motion` end with what they have; the same command resumes them',
     )
+    parser.add_argument('--only', default='', metavar='SET', help='data set of `generalisation`, such as `fingersense`')
     parser.add_argument('--long', action='store_true', help=f'with {ALL}: also {", ".join(sorted(LONG))}')
     add_seed(parser)
 
@@ -50,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
     """Run one benchmark, or all for which the data is there: 1 if one of these fails."""
     options.out.mkdir(parents=True, exist_ok=True)  # not only when the figures are there
     benchmark_options = BenchmarkOptions(
-        options.out, options.data, options.seed, options.quick, options.workers, 60.0 * options.minutes
+        options.out, options.data, options.seed, options.quick, options.workers, 60.0 * options.minutes, options.only
     )
     if options.name != ALL:
         _run_one(options.name, benchmark_options)
@@ -78,5 +79,5 @@ def _run_one(name: str, benchmark_options: BenchmarkOptions) -> None:
     began_s = time.monotonic()
     with task(name):
         result, path = run_benchmark(name, benchmark_options)
-    took = f'{name}, {time.monotonic() - began_s:.0f} s: {(result.measured or name).splitlines()[0]}'
+    took = f'{name}, {time.monotonic() - began_s:.0f} s: {(BENCHMARKS[name].__doc__ or name).splitlines()[0]}'
     print('\n  '.join([took, result.data, *map(str, (path, *result.charts))]), flush=True)
