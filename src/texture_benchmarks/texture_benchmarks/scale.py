@@ -90,8 +90,7 @@ class FeatureSpread:
 def _root(deviations: Array) -> Array:
     """Return the symmetric square root of a covariance, from deviations (n, n_features)."""
     values, vectors = eigh(deviations.T @ deviations / max(1, len(deviations) - 1))
-    root: Array = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
-    return root
+    return (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
 
 
 RECIPE = 'default'
