@@ -273,28 +273,19 @@ class Second(threading.Thread):
     def __init__(self, machine: VirtualMachine) -> None:
         super().__init__(daemon=True)
         self._explorer = VirtualExplorer(machine, lambda _phase: None, math.pi)
+        self.arm = self._explorer.arm
         self._ours, self._theirs = threading.Semaphore(0), threading.Semaphore(0)
-        self._begun = False
         self.end = ''
 
     def step(self) -> None:
         """Let it do one step, as long as it explores."""
-        if not self._begun:
-            self._begun = True
+        if self.ident is None:
             self.start()
-        elif not self.is_alive():
-            return
-        else:
+        elif self.is_alive():
             self._ours.release()
+        else:
+            return
         self._theirs.acquire()
-
-    def drive(self) -> None:
-        """Let its arm do one period."""
-        self._explorer.arm.step()
-
-    def connect(self) -> None:
-        """Take the arm."""
-        self._explorer.arm.connect()
 
     def run(self) -> None:
         """Explore, and hand the turn back for good."""
@@ -328,14 +319,14 @@ def explored(trial: ForceTrial) -> TrialEnd:
         if machine.second_ns and not seconds:
             seconds.append(Second(machine))
             machine.measure()
-            seconds[0].connect()
+            seconds[0].arm.connect()
         for _ in range(round(EXPLORER_PERIODS * PERIOD_NS / STEP_NS)):
             machine.advance()
             if machine.now_ns % PERIOD_NS == 0:
                 machine.measure()
                 explorer.arm.step()
                 for second in seconds:
-                    second.drive()
+                    second.arm.step()
         for second in seconds:
             second.step()
 
