@@ -98,7 +98,7 @@ def test_what_is_trained_from_either_end_lies_in_no_test_of_another_stretch() ->
 
 
 def test_what_is_finished_is_not_computed_again_and_what_is_not_is_named(tmp_path: Path) -> None:
-    options = BenchmarkOptions(tmp_path, workers=1, only='simulated track', budget_s=0.01)
+    options = BenchmarkOptions(tmp_path, only='simulated track', budget_s=0.01)
     row, cell = 'simulated, no gap', figures([ended('cork', 'cork', accepted=True, cluster='a')])
     line = {'part': f'simulated track, {SVC}', 'found': [[HALVES, row, SVC, cell]]}
     (tmp_path / generalisation.FINISHED).write_text(json.dumps(line) + '\n')

@@ -19,14 +19,14 @@ def test_a_part_that_fails_or_lasts_too_long_leaves_the_others_and_none_is_compu
             threading.Event().wait()
         return 1 / job
 
-    options = BenchmarkOptions(tmp_path, workers=3, budget_s=5.0)
-    jobs = {'one': 1, 'zero': 0, 'late': 'waits', 'two': 2}
+    options = BenchmarkOptions(tmp_path, budget_s=5.0)
+    jobs = {'one': 1, 'zero': 0, 'two': 2, 'late': 'waits'}
     assert resumed(work, jobs, tmp_path / 'parts.jsonl', options) == {'one': 1.0, 'two': 0.5}
     printed = capsys.readouterr().out
     assert 'zero failed: ZeroDivisionError' in printed
     assert 'ended after 5 s' in printed
     found = resumed(lambda _job: 'again', jobs, tmp_path / 'parts.jsonl', options)
-    assert found == {'one': 1.0, 'zero': 'again', 'late': 'again', 'two': 0.5}
+    assert found == {'one': 1.0, 'zero': 'again', 'two': 0.5, 'late': 'again'}
     assert '2 parts are of an earlier run' in capsys.readouterr().out
     assert not (tmp_path / 'parts.jsonl').exists()
 

@@ -46,8 +46,7 @@ class BenchmarkOptions:
     data: Path | None = None
     seed: int = 0  # Of everything random
     quick: bool = False  # Fewer repetitions, for tests; such numbers are not for publishing
-    workers: int = 0  # Processes of a study that can be split into parts; 0: one for each core
-    budget_s: float = math.inf  # After this time such a study ends with the parts that it has
+    budget_s: float = math.inf  # After this time a study that has parts ends with those that it has
     only: str = ''  # The one data set of `generalisation` that is measured; '' for all
 
     def has(self, name: str) -> bool:
@@ -122,7 +121,7 @@ def resumed(
         print(f"{len(found)} parts are of an earlier run, from '{path}'; remove it to compute all again", flush=True)
     left = [name for name in jobs if name not in found]
     with path.open('a', encoding='utf-8') as file:
-        for place, future in _forked(lambda name: work(jobs[name]), left, options.workers, options.budget_s):
+        for place, future in _forked(lambda name: work(jobs[name]), left, options.budget_s):
             if (error := future.exception()) is not None:
                 print(f'{left[place]} failed: {type(error).__name__}: {error}', flush=True)
                 continue
@@ -135,11 +134,11 @@ def resumed(
 
 
 def _forked(
-    work: Callable[[Job], Out], jobs: Sequence[Job], workers: int = 0, budget_s: float = math.inf
+    work: Callable[[Job], Out], jobs: Sequence[Job], budget_s: float = math.inf
 ) -> Iterator[tuple[int, Future[Out]]]:
     """Yield the places of jobs and what they came to, as they are finished; what lasts beyond the budget is ended."""
     context = multiprocessing.get_context('fork')
-    count = min(len(jobs), workers or len(os.sched_getaffinity(0)))
+    count = min(len(jobs), len(os.sched_getaffinity(0)))
     others = multiprocessing.active_children()
     pool = ProcessPoolExecutor(max(count, 1), context, _begin, (work,))
     places = {pool.submit(_do, job): place for place, job in enumerate(jobs)}
