@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from texture_benchmarks.catalogue import run_benchmark
-from texture_benchmarks.force_trials import ForceTrial, explored
+from texture_benchmarks.motion import ForceTrial, explored
 from texture_benchmarks.study import BenchmarkOptions
 
 MOST_N = {

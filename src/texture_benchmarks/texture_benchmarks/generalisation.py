@@ -25,8 +25,8 @@ from texture_benchmarks.study import (
     BenchmarkOptions,
     BenchmarkResult,
     fraction_interval,
-    imported,
     map_forked,
+    recorded,
     resumed,
     with_spaced_windows,
 )
@@ -387,9 +387,8 @@ def slides_at(scene: Scene, places_m: Any, directions_rad: Any, rng: np.random.G
 
 def _read_fingersense(options: BenchmarkOptions) -> SlideDataset:
     """Read the dates from which on levels are alike: before, they are twenty times lower."""
-    with imported(options, 'fingersense') as bags:
-        slides = SlideDataset.from_bags(bags).select(labels=FABRICS, where=lambda one: one.session >= DATES[0])
-    return _middles(slides)
+    slides = recorded(options, 'fingersense')
+    return _middles(slides.select(labels=FABRICS, where=lambda one: one.session >= DATES[0]))
 
 
 def _dates(slides: SlideDataset) -> Trials:
@@ -506,11 +505,6 @@ def _other_half(slides: SlideDataset) -> Trials:
     return halves, trials
 
 
-def _read_bags(name: str, options: BenchmarkOptions) -> SlideDataset:
-    with imported(options, name) as bags:
-        return SlideDataset.from_bags(bags)
-
-
 def _read_biotac20(options: BenchmarkOptions) -> SlideDataset:
     """Read the materials in parallel processes: one after the other takes minutes."""
     names = sorted(path.stem for path in options.recordings('biotac20').glob('material*.npz'))
@@ -518,8 +512,7 @@ def _read_biotac20(options: BenchmarkOptions) -> SlideDataset:
 
 
 def _read_material(options: BenchmarkOptions, name: str) -> tuple[LabelledSlide, ...]:
-    with imported(options, 'biotac20', materials=[name]) as bags:
-        return SlideDataset.from_bags(bags).slides
+    return recorded(options, 'biotac20', materials=[name]).slides
 
 
 class Source(NamedTuple):
@@ -548,9 +541,9 @@ SETS: Mapping[str, Source] = {
     'fingersense': Source(_read_fingersense, {'dates': (TAXELS, _dates)}),
     'spider_sandpaper': Source(_read_spider, {'sessions': (TAXELS, _sessions)}),
     'borealtc': Source(_read_borealtc, {'runs': (PLAIN, _runs)}),
-    'lmt29': Source(partial(_read_bags, 'lmt29'), {'strokes': (PLAIN, _strokes)}),
+    'lmt29': Source(partial(recorded, name='lmt29'), {'strokes': (PLAIN, _strokes)}),
     'ntp21': Source(
-        partial(_read_bags, 'ntp21'),
+        partial(recorded, name='ntp21'),
         {'speeds': (('any-speed', SVC), _speeds), 'other half': (('any-speed', SVC), _other_half)},
     ),
     'simulated places': Source(_read_places, {'simulated places': (PLAIN, _places)}),

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, imported
+from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, recorded
 from texture_core.config import find
 from texture_core.types import Array, SlideMotion, Window
 from texture_estimation.incremental import IncrementalClassifier
@@ -165,7 +165,7 @@ def recorded_touches(slide: SlideSamples) -> Array:
     return np.concatenate([feature(batch) for _, feature in raw.features], axis=-1).mean(axis=1)
 
 
-def chosen_motions(options: BenchmarkOptions, bags: Sequence[Path]) -> dict[str, dict[str, list[float]]]:
+def chosen_motions(options: BenchmarkOptions, dataset: SlideDataset) -> dict[str, dict[str, list[float]]]:
     """Return the accuracy after each slide, simulated and recorded, by the strategy that chooses motions."""
     found: dict[str, list[dict[str, Array]]] = {SIMULATED: [], RECORDED: []}
 
@@ -179,14 +179,15 @@ def chosen_motions(options: BenchmarkOptions, bags: Sequence[Path]) -> dict[str,
         found[SIMULATED].append(right_after_slides(known, motions, tested, rng, SLIDES))
 
     # Recorded: every other touch of each slide is trained, and the others are drawn for the test.
-    slides = SlideDataset.from_bags(bags[:4] if options.quick else bags).samples('signal')
+    names = list(dict.fromkeys(dataset.labels.tolist()))
+    slides = dataset.select(labels=names[: 4 if options.quick else None]).samples('signal')
     touches = {
         (SlideMotion('linear_slide', 0.0, round(one.speed_m_s, 3), round(one.force_n, 2), 0.0), one.surface): (
             recorded_touches(one)
         )
         for one in slides
     }
-    recorded, surfaces = list(dict.fromkeys(motion for motion, _ in touches)), sorted({name for _, name in touches})
+    kinds, surfaces = list(dict.fromkeys(motion for motion, _ in touches)), sorted({name for _, name in touches})
     for trained in (0, 1):
         rng = np.random.default_rng([options.seed, trained])
         tests = [(motion, name, values[trained::2]) for (motion, name), values in touches.items()]
@@ -200,9 +201,9 @@ def chosen_motions(options: BenchmarkOptions, bags: Sequence[Path]) -> dict[str,
             few = len(values) < TOUCHES  # only then a touch comes again within a trial
             return np.concatenate([values[rng.choice(len(values), TOUCHES, replace=few)] for _ in range(TRIALS)])
 
-        cells = [drawn(touches[cell][1 - trained :: 2]) for cell in itertools.product(recorded, surfaces)]
-        tested = np.stack(cells).reshape(len(recorded), len(surfaces), TRIALS * TOUCHES, -1)
-        found[RECORDED].append(right_after_slides(known, recorded, tested, rng, TOUCHES))
+        cells = [drawn(touches[cell][1 - trained :: 2]) for cell in itertools.product(kinds, surfaces)]
+        tested = np.stack(cells).reshape(len(kinds), len(surfaces), TRIALS * TOUCHES, -1)
+        found[RECORDED].append(right_after_slides(known, kinds, tested, rng, TOUCHES))
     return {
         source: {way: np.mean([one[way] for one in parts], axis=0).round(4).tolist() for way in parts[0]}
         for source, parts in found.items()
@@ -231,9 +232,10 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     if isinstance(recipe.learner, Mlp):
         recipe = replace(recipe, learner=replace(recipe.learner, folds=FOLDS))
     stages, last_training = (QUICK_STAGES, QUICK_TRAINED) if options.quick else (STAGES, TRAINED)
-    some, size, count = ((QUICK_SLIDES, QUICK_MATERIALS), 1, 1) if options.quick else ((), NEW, DRAWS)
-    with imported(options, 'biotac20', *some) as bags, tempfile.TemporaryDirectory() as folder:
-        examples = training_examples(recipe, SlideDataset.from_bags(bags, topics=recipe.feature_set.topics))
+    size, count = (1, 1) if options.quick else (NEW, DRAWS)
+    slides = recorded(options, 'biotac20', (QUICK_SLIDES, QUICK_MATERIALS), topics=recipe.feature_set.topics)
+    examples = training_examples(recipe, slides)
+    with tempfile.TemporaryDirectory() as folder:
         labels, rng = np.unique(examples.labels), np.random.default_rng(options.seed)
         draws = [rng.permutation(labels)[:size] for _ in range(count)]
         given: Any = {'last_training': last_training, 'stages': stages}
@@ -241,8 +243,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
             run_incremental(recipe, examples, draw.tolist(), **given, path=Path(folder) / f'draw{number}')
             for number, draw in enumerate(draws)
         ]
-    with imported(options, 'ntp21') as bags:
-        chosen = chosen_motions(options, bags)
+    chosen = chosen_motions(options, recorded(options, 'ntp21'))
     return BenchmarkResult(
         data=f'BioTac vibration, {len(labels)} materials (github dexrob/BioTac_slide_20_50, Gao et al. 2020), recipe '
         f'{RECIPE} calibrated in {FOLDS} parts',

@@ -25,8 +25,8 @@ from texture_benchmarks.study import (
     BenchmarkOptions,
     BenchmarkResult,
     accuracy_interval,
-    imported,
     map_forked,
+    recorded,
     with_spaced_windows,
 )
 from texture_core.types import AnyArray, Array
@@ -92,9 +92,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     estimate (µs, median and 99th percentile), by the clock of the processor, of the round of 5 over all methods whose
     median was lowest.
     """
-    some = (QUICK_SLIDES, QUICK_MATERIALS) if options.quick else ()
-    with imported(options, 'biotac20', *some) as bags:
-        dataset = SlideDataset.from_bags(bags)
+    dataset = recorded(options, 'biotac20', (QUICK_SLIDES, QUICK_MATERIALS))
     splitter = ChronologicalSplit(4 / 6 if options.quick else 30 / 40)  # of the slides of each material
     jobs = jobs_of(options.quick)
     tried = dict(zip(jobs, map_forked(partial(_try, dataset, splitter, options.seed), jobs), strict=True))

@@ -21,8 +21,8 @@ from texture_benchmarks.study import (
     BenchmarkOptions,
     BenchmarkResult,
     fraction_interval,
-    imported,
     map_forked,
+    recorded,
 )
 from texture_core.types import Array
 from texture_estimation.learners.learner import of_examples
@@ -68,9 +68,8 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     Intervals of 95 % by bootstrap over material × half.
     """
     # Read the slides, and train and test every recipe at the halves of the track.
-    some = ('1-12', QUICK_MATERIALS) if options.quick else ()
-    with imported(options, 'biotac20', *some) as bags:
-        slides = SlideDataset.from_bags(bags, '1-12' if options.quick else '21-40').in_parts(2)
+    whole = recorded(options, 'biotac20', ('1-12', QUICK_MATERIALS))
+    slides = whole.select('1-12' if options.quick else '21-40').in_parts(2)
     earlier, later = ('1-8', '9-12') if options.quick else (EARLIER, LATER)
     numbers: dict[str, dict[str, Any]] = {SAME: {}, PLACE: {}}
     names = QUICK if options.quick else tuple(RECIPES)

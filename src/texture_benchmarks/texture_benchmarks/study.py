@@ -13,7 +13,6 @@ import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -25,7 +24,9 @@ from texture_core.errors import DeviceError, InvalidData
 from texture_core.types import AnyArray
 from texture_estimation.recipe import Recipe
 from texture_evaluation.cross_validation import interval, single_blas_thread
+from texture_recordings.dataset import SlideDataset
 from texture_recordings.public_sets import IMPORTS
+from texture_recordings.slides import STREAMS
 
 CPU_INFO = Path('/proc/cpuinfo')
 DATA = {
@@ -181,14 +182,19 @@ def accuracy_interval(right: Sequence[bool], surfaces: Sequence[str]) -> tuple[f
     return float(min(drawn[0], exact.low)), float(max(drawn[1], exact.high))
 
 
-@contextmanager
-def imported(
-    options: BenchmarkOptions, name: str, slides: str = '', materials: Sequence[str] = ()
-) -> Iterator[list[Path]]:
-    """Give the bags of a data set, or of a part of it, to a `with` block."""
-    source = options.recordings(name)
+def recorded(
+    options: BenchmarkOptions,
+    name: str,
+    quick: tuple[str, Sequence[str]] = ('', ()),
+    *,
+    materials: Sequence[str] = (),
+    topics: Sequence[str] = STREAMS,
+) -> SlideDataset:
+    """Return a recorded data set, or some of its materials; of a reduced run the slides and materials of `quick`."""
+    slides, some = quick if options.quick else ('', ())
     with tempfile.TemporaryDirectory() as folder:
-        yield IMPORTS[name](source, Path(folder), slides, materials)
+        bags = IMPORTS[name](options.recordings(name), Path(folder), slides, materials or some)
+        return SlideDataset.from_bags(bags, topics=topics)
 
 
 def with_spaced_windows(recipe: Recipe) -> Recipe:

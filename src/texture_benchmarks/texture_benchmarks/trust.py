@@ -19,7 +19,7 @@ from texture_benchmarks.study import (
     BenchmarkOptions,
     BenchmarkResult,
     accuracy_interval,
-    imported,
+    recorded,
     with_spaced_windows,
 )
 from texture_core.types import Array, TactileSignal, join_batches
@@ -198,8 +198,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     bootstrap over surfaces, or exact over slides where these are wider.
     """
     rows, compared = (QUICK_ROWS, QUICK_COMPARED) if options.quick else (tuple(ROWS), COMPARED)
-    with imported(options, 'biotac20', *(('1-15', QUICK_MATERIALS) if options.quick else ())) as bags:
-        slides = SlideDataset.from_bags(bags)
+    slides = recorded(options, 'biotac20', ('1-15', QUICK_MATERIALS))
     trained, tested, to_disturb = map(slides.select, QUICK_SELECTED if options.quick else SELECTED)
     # Train, and test without a disturbance, with each, and over unknown materials.
     models = {}

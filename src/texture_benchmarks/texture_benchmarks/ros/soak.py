@@ -22,7 +22,6 @@ from unittest import mock
 
 import numpy as np
 from geometry_msgs.msg import TwistStamped, WrenchStamped
-from rclpy.executors import ExternalShutdownException
 
 from texture_benchmarks.ros.graph import Graph
 from texture_benchmarks.study import BenchmarkResult
@@ -97,7 +96,7 @@ HUNG_S, BACK_S, LIMIT_N, ABOVE_S, FREE_N = 60.0, 60.0, 10.0, 0.1, 0.2
 # --------------------
 # What is recorded, and what must hold.
 
-SUCCESS, ABORTED, REFUSED, LOST = ENDINGS = 'success', 'aborted', 'refused', 'lost'
+SUCCESS = 'success'
 
 
 class FaultTrial(NamedTuple):
@@ -135,18 +134,6 @@ def check(trials: Sequence[FaultTrial], ended: int) -> dict[str, Any]:
     return {requirement: {'seen': seen, 'holds': holds} for requirement, (seen, holds) in found.items()}
 
 
-def figures(trials: Sequence[FaultTrial]) -> dict[str, Any]:
-    """Return how explorations ended under one fault."""
-    return {
-        'explorations': len(trials),
-        **{ending: sum(one.ending == ending for one in trials) for ending in ENDINGS},
-        'peak_n': max(one.peak_n for one in trials),
-        'above_ms': 1e3 * max(one.above_s for one in trials),
-        'left_n': max(one.left_n for one in trials),
-        'messages': sorted({one.message for one in trials}),
-    }
-
-
 # --------------------
 # The run.
 
@@ -161,7 +148,7 @@ class Rig(Graph):
         self.ended = 0  # nodes that ended by themselves
         self._forces: list[tuple[float, float]] = []
         self.node.create_subscription(WrenchStamped, 'true_wrench', self._on_wrench, 1000)
-        self._thread = threading.Thread(target=self._listen, daemon=True)
+        self._thread = threading.Thread(target=self._executor.spin, daemon=True)
         self._thread.start()
 
     def __exit__(self, *_: object) -> None:
@@ -169,13 +156,9 @@ class Rig(Graph):
             self._nodes[name].stop()
         for operator in (self._operator, self._other):
             operator.__exit__(None, None, None)
-        self._context.try_shutdown()
+        self._executor.shutdown()
         self._thread.join()
         super().__exit__()
-
-    def _listen(self) -> None:
-        with suppress(ExternalShutdownException):
-            self._executor.spin()
 
     def _on_wrench(self, wrench: WrenchStamped) -> None:
         force = wrench.wrench.force
@@ -234,10 +217,10 @@ class Rig(Graph):
 
         try:
             answer = self._operator.explore(ExplorationRequest('linear_slide', surface=surface, **SLIDE), on_progress)
-            ending = SUCCESS if answer.success else ABORTED if answer.exploration_id else REFUSED
+            ending = SUCCESS if answer.success else 'aborted' if answer.exploration_id else 'refused'
             message = answer.message
         except TextureError as error:
-            ending, message = LOST, str(error)
+            ending, message = 'lost', str(error)
         for thread in acting:
             thread.join()
         return bool(acting) or not in_slide, ending, message
@@ -327,11 +310,7 @@ def soak(
         numbers={
             'seed': seed,
             'duration_s': duration_s,
-            'explorations': len(trials),
             'requirements': check(trials, running.ended),
-            'faults': {
-                name: figures([one for one in trials if one.fault == name])
-                for name in dict.fromkeys(one.fault for one in trials)
-            },
+            'trials': [one._asdict() for one in trials],
         },
     )
