@@ -13,6 +13,7 @@ from pathlib import Path
 from texture_benchmarks.catalogue import BENCHMARKS, run_benchmark
 from texture_benchmarks.study import BenchmarkOptions
 from texture_core.cli import add_seed, task
+from texture_core.errors import InvalidParameter
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -40,6 +41,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run one benchmark."""
+    if options.only and options.name != 'generalisation':
+        raise InvalidParameter(f"--only is '{options.only}'; `generalisation` alone has data sets to choose from")
     options.out.mkdir(parents=True, exist_ok=True)  # not only when the figures are there
     benchmark_options = BenchmarkOptions(
         options.out, options.data, options.seed, options.quick, 60.0 * options.minutes, options.only
