@@ -25,7 +25,6 @@ from texture_benchmarks.study import (
     BenchmarkOptions,
     BenchmarkResult,
     fraction_interval,
-    map_forked,
     recorded,
     resumed,
     with_spaced_windows,
@@ -505,16 +504,6 @@ def _other_half(slides: SlideDataset) -> Trials:
     return halves, trials
 
 
-def _read_biotac20(options: BenchmarkOptions) -> SlideDataset:
-    """Read the materials in parallel processes: one after the other takes minutes."""
-    names = sorted(path.stem for path in options.recordings('biotac20').glob('material*.npz'))
-    return SlideDataset(tuple(one for slides in map_forked(partial(_read_material, options), names) for one in slides))
-
-
-def _read_material(options: BenchmarkOptions, name: str) -> tuple[LabelledSlide, ...]:
-    return recorded(options, 'biotac20', materials=[name]).slides
-
-
 class Source(NamedTuple):
     """A data set: what reads it, and the recipes and the trials of each part of the study that is of it."""
 
@@ -525,7 +514,7 @@ class Source(NamedTuple):
 PLAIN = ('default', SVC)
 SETS: Mapping[str, Source] = {
     'biotac20': Source(
-        _read_biotac20,
+        partial(recorded, name='biotac20'),
         {
             'cells': ((*PLACE_RECIPES, SVC), _cells),
             **{

@@ -186,14 +186,12 @@ def recorded(
     options: BenchmarkOptions,
     name: str,
     quick: tuple[str, Sequence[str]] = ('', ()),
-    *,
-    materials: Sequence[str] = (),
     topics: Sequence[str] = STREAMS,
 ) -> SlideDataset:
-    """Return a recorded data set, or some of its materials; of a reduced run the slides and materials of `quick`."""
-    slides, some = quick if options.quick else ('', ())
+    """Return a recorded data set; of a reduced run the slides and materials of `quick`."""
     with tempfile.TemporaryDirectory() as folder:
-        bags = IMPORTS[name](options.recordings(name), Path(folder), slides, materials or some)
+        some = quick if options.quick else ('', ())
+        bags = IMPORTS[name](options.recordings(name), Path(folder), *some)
         return SlideDataset.from_bags(bags, topics=topics)
 
 
