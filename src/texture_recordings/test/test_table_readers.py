@@ -174,7 +174,7 @@ def test_links_out_of_an_hdf5_file_are_not_followed(tmp_path: Path) -> None:
     ('text', 'form'),
     [
         ('a;b\n1,5;2\n3,25;4\n', {'decimal': ','}),
-        ('// note\n1.5 2\n3.25 4\n', {'comment': '//', 'header': False}),
+        ('# note\n1.5 2\n3.25 4\n', {'header': False}),
         ('units\na|b\n"1.5"|2\n3.25|4\n', {'skip_rows': 1}),
         ('\ufeffa,b\r\n1.5,2\r\n\r\n3.25,4\r\n', {}),
     ],

@@ -13,7 +13,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import groupby, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +36,6 @@ from texture_core.types import (
 from texture_recordings.bags import DELAY_NS, PAUSE_NS, START_NS, BagWriter, is_bag, is_cut_off, slide_batches
 from texture_recordings.clock import (
     MAX_LEFT_OUT,
-    RESET_ROWS,
     SAME_RATE,
     TIMES,
     ClockFault,
@@ -61,11 +60,11 @@ PLAUSIBLE_HZ, LIKELY_HZ = (5.0, 200_000.0), (20.0, 20_000.0)
 LONGEST_SLIDE_S = 1800.0
 STATE_S = 0.1  # a state so often where a condition changes along a slide
 SAME_TIME_S = 1e-9
-WIDE = 100  # columns name_1 … name_n beyond this are hardly channels
+MAX_NUMBERED = 3  # columns name_1 … name_n beyond this may be samples: the mapping has to tell
 MAX_SLIDES = 20_000  # of one file
 COPIED_ROWS = 3
-MAX_ALTERNATING = 6  # sensors of which one row each follows the other
-MAX_PEEKED = 40  # columns in which they are looked for
+MAX_ALTERNATING = 100  # sensors of which one row each follows the other
+PEEKED_COLUMNS, PEEKED_ROWS = 40, 2000  # in which they are looked for
 # Lowest and highest mean of a slide that a tactile finger reaches, in SI units.
 PLAUSIBLE: Mapping[str, tuple[float, float]] = {
     'speed': (5e-5, 2.0), 'force': (1e-3, 100.0), 'direction': (-6.3, 6.3),
@@ -154,8 +153,8 @@ def import_tables(
     with SlideBags(mapping, out) as bags:
         for path, place, fields in progress(_files(mapping, Path(source), kinds, report), 'import files'):
             for frame in frames(path, place, mapping):
-                for session, named, streams, conditions in FrameSlides(mapping, frame, fields, report).slides():
-                    bags.write(session, named, streams, conditions)
+                for slide in FrameSlides(mapping, frame, fields, report).slides():
+                    bags.write(*slide)
             if path.is_dir() or path.suffix == '.mcap':
                 cut = is_cut_off(path)
                 report.leave_out('bags were cut off, and end with their last whole part', int(cut), f"'{place}'; see "
@@ -201,10 +200,10 @@ def _files(
 def _refuse_as_file(folder: Path, source: Path, mapping: TableMapping, kinds: Sequence[str]) -> None:
     """Refuse a folder with the name of a file that is wanted, or with the parts of a bag that cannot be read."""
     place = folder.relative_to(source).as_posix()
+    parts = sorted(one.name for one in folder.iterdir() if 'bag' in kinds and one.suffix in ('.mcap', '.db3'))
     if template_fields(mapping.files, place) is None:
         return
-    parts = sorted(one.name for one in folder.iterdir() if one.suffix in ('.mcap', '.db3'))
-    if 'bag' in kinds and parts:
+    if parts:
         raise InvalidData(
             f"'{place}' holds {', '.join(parts[:3])} without metadata.yaml; write it anew: ros2 bag reindex"
         )
@@ -248,6 +247,7 @@ class FrameSlides:
         self._fields = {**frame.fields, **fields}
         self._chosen = {name: frame.chosen(stream.columns) for name, stream in mapping.streams.items()}
         self._columns = self._read()
+        self._refuse_alternating()
         self._check_rows()
         streams = [self._stream(name, params) for name, params in mapping.streams.items()]
         # Slides are cut by the rows of the stream that corresponds to the column at which they end.
@@ -257,8 +257,8 @@ class FrameSlides:
         self._spans = self._cut()
         self._streams = [self._rated(one) for one in streams]
         self._check_shared_rows()
-        self._refuse_alternating()
-        if frame.trials > 1 and mapping.slides.by != 'column' and not self._timed():
+        untimed = any(one.time_s is None for one in self._streams)
+        if frame.trials > 1 and mapping.slides.by != 'column' and untimed:
             raise InvalidData(f"'{self._place}' has {frame.trials} trials; write slides: {{by: column, column: trial}}")
         self._reference = next(one for one in self._streams if one.name == self._reference.name)
 
@@ -317,21 +317,28 @@ class FrameSlides:
         return read
 
     def _refuse_alternating(self) -> None:
-        """Refuse rows of which an unused column, as the name of a sensor, has the same few values again and again."""
+        """Refuse rows of several sensors: an unused column, as of their names, changes in turn or at one time."""
         used = {*self._columns.numbers, *self._columns.texts}
-        unused = [name for name in self._frame.names if name not in used][:MAX_PEEKED]
-        for name, texts in (self._frame.peek(unused) if self._frame.peek and unused else {}).items():
-            values, codes = np.unique(texts, return_inverse=True)
+        unused = [name for name in self._frame.names if name not in used][:PEEKED_COLUMNS]
+        clocks = [one.time.column for one in self._mapping.streams.values() if one.time.column in self._frame.names]
+        peeked = self._frame.read([], list({*unused, *clocks}), PEEKED_ROWS).texts if unused else {}
+        for name in unused:
+            values, codes = np.unique(peeked[name], return_inverse=True)
             count = len(values)
-            if 2 <= count <= MAX_ALTERNATING and len(texts) >= 10 * count and (codes[count:] == codes[:-count]).all():
+            enough = 2 <= count <= MAX_ALTERNATING and len(codes) >= 10 * count
+            if not enough or (codes[1:] != codes[:-1]).mean() < 0.5:
+                continue
+            in_turn = (codes[count:] == codes[:-count]).mean() > 0.9
+            for clock in clocks:
+                times, at = np.unique(peeked[clock], return_inverse=True)
+                pairs = np.unique(at * count + codes) if len(at) == len(codes) else []
+                in_turn |= len(times) < 0.9 * len(at) and len(pairs) == len(codes)
+            if in_turn:
                 raise InvalidData(
-                    f"'{self._place}': the rows have one value of '{name}' after the other ({', '.join(values)}), so "
-                    f"the signals of several sensors may alternate; choose one by rows: {{{name}: '{values[0]}'}}, or "
-                    f"all of one signal by rows: {{{name}: '*'}}"
+                    f"'{self._place}': the rows have one value of '{name}' after the other "
+                    f'({", ".join(values[:5].tolist())}), so the signals of several sensors may alternate; choose one '
+                    f"by rows: {{{name}: '{values[0]}'}}, or all of one signal by rows: {{{name}: '*'}}"
                 )
-
-    def _timed(self) -> bool:
-        return all(one.time_s is not None for one in self._streams)
 
     def _check_shared_rows(self) -> None:
         """Refuse stated rates that contradict the rows which two streams without times share."""
@@ -388,9 +395,6 @@ class FrameSlides:
                 found |= np.isnan(self._columns.numbers[column]) & ~blank
             if (time := self._mapping.streams[name].time.column) and len(self._columns.numbers[time]) == len(found):
                 found |= np.isnan(self._columns.numbers[time])
-        outside = [f"'{self._place}', row {line}" for line in self._columns.outside]
-        self._report.rows += len(outside)
-        self._report.leave_out('rows above or below the samples', len(outside), *outside)
         for length, marked in bad.items():
             junk = self._columns.junk
             found = marked | junk if junk is not None and length == len(junk) else marked
@@ -410,7 +414,6 @@ class FrameSlides:
 
     def _stream(self, name: str, params: StreamColumns) -> Stream:
         names, group = self._chosen[name], self._group(self._chosen[name][0])
-        self._check_width(name, params, names, group[1])
         per_row = params.samples_per_row or 1
         if len(names) % per_row:
             raise InvalidData(
@@ -429,7 +432,7 @@ class FrameSlides:
                 samples[:, place] = self._columns.numbers[column] * params.scale
         if np.isinf(samples).any():
             raise InvalidData(f"'{self._place}': '{name}' has values above 3.4e38; look at the columns and at `scale`")
-        self._check_groups(name, params, names, samples)
+        self._check_groups(name, params, names, len(samples))
         kept, time_s = ~self._blank(name), None
         column = params.time.column or self._frame.clocks.get(names[0], '')
         if column:
@@ -440,6 +443,9 @@ class FrameSlides:
             kept &= np.isfinite(raw)
             unit = TIME_UNITS[params.time.unit if params.time.column else 's']
             time_s = unwrapped(raw[kept]) * unit
+        else:  # rows without any number above the samples and below them are none
+            known = np.flatnonzero(np.isfinite(samples).any(axis=1))
+            kept[: known[0]] = kept[known[-1] + 1 :] = False
         rows = np.flatnonzero(kept)
         self._report.channels.setdefault(name, channels)
         if self._report.channels[name] != channels and len(self._report.channels[name]) != len(channels):
@@ -449,42 +455,26 @@ class FrameSlides:
             )
         return Stream(name, params, channels, samples[rows], rows, time_s, group, per_row)
 
-    def _check_width(self, name: str, params: StreamColumns, names: Sequence[str], rows: int) -> None:
-        """Refuse a row that looks like a window, or an array that lies on its side, unless the mapping tells."""
-        numbered = all(re.fullmatch(r'.*?\d+', one) for one in names)
-        if not params.samples_per_row and len(names) > 8 and (len(names) > rows or (numbered and len(names) > WIDE)):
-            raise InvalidData(
-                f"'{self._place}': the stream '{name}' has {len(names)} columns, {names[0]} … {names[-1]}, and {rows} "
-                f'rows; write samples_per_row: {len(names)} if a row holds that many consecutive samples of one '
-                'channel (slides: {by: row} if it is a window), samples_per_row: 1 if the columns are channels, or '
-                'format: {transpose: true} if the array lies on its side'
-            )
-
-    def _check_groups(self, name: str, params: StreamColumns, names: Sequence[str], samples: AnyArray) -> None:
-        """Refuse columns that are no consecutive samples although the mapping says so, or that seem to be some."""
+    def _check_groups(self, name: str, params: StreamColumns, names: Sequence[str], rows: int) -> None:
+        """Refuse columns that may be consecutive samples unless the mapping tells, or that it wrongly calls so."""
         parts = [re.fullmatch(r'(.*?)(\d{1,9})', one) for one in names]
-        if not all(parts):
-            return
-        stems, numbers = [one[1] for one in parts if one], np.array([int(one[2]) for one in parts if one])
+        follows = [bool(a and b and a[1] == b[1] and int(b[2]) == int(a[2]) + 1) for a, b in pairwise(parts)]
         count = params.samples_per_row
-        if count > 1:
-            groups = [slice(first, first + count) for first in range(0, len(names), count)]
-            if any(len({*stems[one]}) > 1 or (np.diff(numbers[one]) != 1).any() for one in groups):
+        if not count:
+            together = max((len(list(same)) for follow, same in groupby(follows) if follow), default=0) + 1
+            if together > MAX_NUMBERED:
                 raise InvalidData(
-                    f"'{self._place}': the columns of '{name}' are {', '.join(names[:4])} …, whose numbers do not "
-                    f'count up within {count} columns; write them in the order of the samples, such as a range '
-                    f"'{stems[0]}{numbers.min()}-{numbers.max()}'"
+                    f"'{self._place}': the stream '{name}' has {len(names)} columns, {names[0]} … {names[-1]}, and "
+                    f'{rows} rows; write samples_per_row: {together} if a row holds that many consecutive samples of '
+                    'one channel (slides: {by: row} if it is a window), samples_per_row: 1 if the columns are '
+                    'channels, or format: {transpose: true} if the array lies on its side'
                 )
-        elif not count and len(names) > 3 and len({*stems}) == 1 and (np.diff(numbers) == 1).all() and len(samples) > 9:
-            # The last sample of a row is then as near to the first of the next one as neighbours in a row are.
-            next_row = np.abs(samples[1:, 0] - samples[:-1, -1])
-            within, between = np.abs(np.diff(samples, axis=1)), np.abs(np.diff(samples, axis=0))
-            near, far = np.nanmedian(within), np.nanmedian(between)
-            if near > 0 and np.nanmedian(next_row) < 2.0 * near and far > 3.0 * near:
-                raise InvalidData(
-                    f"'{self._place}': the columns {names[0]} … {names[-1]} go on from row to row as consecutive "
-                    f'samples of one channel; write samples_per_row: {len(names)} if they are, 1 if they are channels'
-                )
+        elif all(parts) and not all(follows[at] for at in range(len(follows)) if (at + 1) % count):
+            raise InvalidData(
+                f"'{self._place}': the columns of '{name}' are {', '.join(names[:4])} …, whose numbers do not "
+                f'count up within {count} columns; write them in the order of the samples, such as a range '
+                f"'{parts[0][1]}0-{count - 1}'"  # type: ignore[index]
+            )
 
     def _cut(self) -> list[slice]:
         """Return the rows of the reference in each slide."""
@@ -498,12 +488,9 @@ class FrameSlides:
             keys = self._aligned(params.column)
             changes = np.flatnonzero(keys[1:] != keys[:-1]) + 1
         elif params.by == 'pause' and times is not None and count > 1:
-            ahead = np.lib.stride_tricks.sliding_window_view(
-                np.append(times[1:], np.full(RESET_ROWS, times[-1])), RESET_ROWS + 1
-            )
-            reset = (ahead < times[:-1, None]).all(axis=1)
-            changes = np.flatnonzero((np.diff(times) >= params.pause_s) | reset) + 1
-            self._refuse_copies(reference, times, np.flatnonzero(reset) + 1)
+            steps = np.diff(times)
+            changes = np.flatnonzero(np.abs(steps) >= params.pause_s) + 1
+            self._refuse_copies(reference, times, np.flatnonzero(steps <= -params.pause_s) + 1)
         elif params.by == 'time':
             if times is not None and (np.diff(times) < 0).any():
                 row = int(np.argmax(np.diff(times) < 0)) + 1
@@ -565,7 +552,6 @@ class FrameSlides:
                     f"'{self._place}': the times of '{name}' do not grow from row to row; give a column of time that "
                     'grows and has enough digits, or `rate_hz` in its place'
                 )
-            self._refuse_mixed(stream, parts, burst_s)
         # Of the first file: windows of all are to have as many samples.
         rate_hz = self._report.rates_hz.get(name) or params.rate_hz or measured
         if measured and not 1 / SAME_RATE <= measured / rate_hz <= SAME_RATE:
@@ -586,26 +572,6 @@ class FrameSlides:
             )
         self._report.rates_hz[name] = rate_hz
         return replace(stream, rate_hz=rate_hz / per_row, burst_s=burst_s)
-
-    def _refuse_mixed(self, stream: Stream, parts: Sequence[Array], burst_s: float) -> None:
-        """Refuse times that come again where an unused column differs between their rows, as the name of a sensor."""
-        whole = np.concatenate(parts)
-        if len(np.unique(whole)) > 0.9 * len(whole) and not (np.diff(whole) < 0).sum() > MAX_LEFT_OUT * len(whole):
-            return
-        used = {*self._columns.numbers, *self._columns.texts}
-        for name in [one for one in self._frame.names if one not in used][:40]:
-            texts = self._frame.read([], [name]).texts[name]
-            texts = texts[stream.rows] if len(texts) == stream.group[1] else texts
-            values, codes = np.unique(texts, return_inverse=True)
-            if len(texts) != len(stream.rows) or not 2 <= len(values) <= len(texts) / 4:
-                continue
-            _, places = np.unique(stream.at_s(), return_inverse=True)
-            if len(np.unique(places.astype(np.int64) * len(values) + codes)) == len(texts):
-                raise InvalidData(
-                    f"'{self._place}': each time occurs once for each value of '{name}' "
-                    f'({", ".join(values[:5].tolist())}), so the signals of several sensors or runs alternate; choose '
-                    f"one by rows: {{{name}: {values[0]}}}, or cut slides at '{name}'"
-                )
 
     def _aligned(self, name: str) -> AnyArray:
         """Return the texts of a column at the rows of the reference: of another clock, the last one until then."""
