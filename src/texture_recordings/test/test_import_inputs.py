@@ -147,7 +147,7 @@ HOLED[[100, 200]] = np.nan
 PAC = {'columns': ['pac_*'], 'rate_hz': 1200.0}
 THOUSANDS = [f'{value:,}' for value in np.round(2000 * X).astype(int).tolist()]
 GERMAN = {'format': {'delimiter': ';', 'decimal': ','}, **RATE}
-TWICE = {'signal': {'columns': ['x'], 'rate_hz': 100.0}, 'signal_static': {'columns': ['y'], 'rate_hz': 100.0}}
+TWICE = {'signal': {'columns': ['x'], 'rate_hz': 100.0}, 'signal_static': {'columns': ['y'], 'rate_hz': 10.0}}
 ROWS: dict[str, tuple[Write, dict, Truth]] = {
     'sensors at times of their own': (
         csv(np.ravel(np.c_[T, T + 0.005]).round(4), np.ravel(np.c_[X, Y]), ['a', 'b'] * N, names='t,x,id'), {},
@@ -166,8 +166,11 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
         'pac_0, pac_1, pac_10, pac_11 …, whose numbers do not count up',
     ),
     'two rates of the same rows': (
+        csv(X, Y, names='x,y'), {'streams': TWICE}, "rows per second are 100 by 'signal', 10 by 'signal_static'",
+    ),
+    'blanks without times': (
         csv(X, [y if row % 10 == 0 else '' for row, y in enumerate(Y)], names='x,y'), {'streams': TWICE},
-        "rows per second are 100 by 'signal', 10 by 'signal_static'",
+        "540 malformed rows of 600, first row 3",
     ),
     'a header again without times': (
         text('x,y\n' + lines(X[:300], Y[:300]) + 'x,y\n' + lines(X[300:], Y[300:])), RATE, 'row 302: the names of the',

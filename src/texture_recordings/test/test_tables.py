@@ -12,7 +12,6 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from texture_core.errors import InvalidData, InvalidParameter, TextureError
 from texture_core.types import NANOSECONDS
 from texture_recordings.bags import message_types
-from texture_recordings.commands.convert import source_folder
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.mapping import TableMapping, load_mapping, mapping_from
 from texture_recordings.readers import MAPPED
@@ -163,7 +162,7 @@ def test_a_label_that_changes_within_a_slide_is_refused_with_its_row(tmp_path: P
             {'streams': {'signal': {'columns': ['a'], 'time': {'unit': 'h'}}}},
             'time: parameter .unit. is .h.; allowed is',
         ),
-        ({'slides': {'by': 'label'}}, 'mapping, slides: .* allowed is one of file, column, pause, time'),
+        ({'slides': {'by': 'label'}}, 'mapping, slides: .* allowed is one of file, column, pause, row'),
         ({'conditions': {'speed': {'unit': 'mph'}}}, "the unit of speed is 'mph'; use one of m/s, cm/s, mm/s"),
         ({'files': '{a}{b}.csv'}, 'fields without text between'),
         ([], 'a mapping of parameter names to values is needed'),
@@ -217,11 +216,6 @@ def save(folder: Path, **arrays: object) -> Path:
     (folder / 'in').mkdir()
     np.savez(folder / 'in' / 'slides.npz', **arrays)
     return folder
-
-
-def test_slides_of_equal_length_are_cut_by_time_and_the_rest_is_left(tmp_path: Path) -> None:
-    mapping = one_channel(slides={'by': 'time', 'length_s': 2.0, 'start_s': 0.5, 'end_s': 0.25})
-    assert lengths(save(tmp_path, x=np.arange(700.0)), mapping) == [125, 125, 125]
 
 
 def test_values_at_which_the_finger_slides_may_be_patterns(tmp_path: Path) -> None:
@@ -432,12 +426,6 @@ def test_a_bag_without_any_of_the_topics_is_refused(tmp_path: Path) -> None:
     wanted = mapping_from({'streams': {'signal': {'columns': ['/nothing/x']}}, 'label': {'value': 'cork'}})
     with pytest.raises(InvalidData, match=r"'foreign' has no topic that the mapping names \(/nothing/x\)"):
         run_message_bag(tmp_path, wanted)
-
-
-def test_the_parent_of_the_folder_of_a_data_set_may_be_given(tmp_path: Path) -> None:
-    assert source_folder(str(tmp_path), 'biotac20') == tmp_path
-    (tmp_path / 'biotac20').mkdir()
-    assert source_folder(str(tmp_path), 'biotac20') == tmp_path / 'biotac20'
 
 
 def test_a_header_in_the_coding_of_windows_is_read(tmp_path: Path) -> None:

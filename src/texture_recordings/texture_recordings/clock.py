@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -69,11 +68,10 @@ def burst_step_s(steps: Array) -> float:
     return float(large[0]) if regular and small.sum() < BURST_DUTY * total else 0.0
 
 
-def estimated_rate_hz(slides: Sequence[Array], burst_s: float) -> float:
-    """Return the rate of the rows of slides in spite of jitter and gaps, of four digits; NaN without steps of time."""
-    found = [_bursts(times, burst_s) for times in slides if len(times)]
-    size = np.median(np.concatenate([counts for _, counts in found])) if burst_s else 1
-    steps = np.concatenate([np.diff(times[starts]) for times, (starts, _) in zip(slides, found, strict=True)])
+def estimated_rate_hz(times: Array, burst_s: float) -> float:
+    """Return the rate of rows in spite of jitter and gaps, of four digits; NaN without steps of time."""
+    starts, counts = _bursts(times, burst_s)
+    size, steps = np.median(counts) if burst_s else 1, np.diff(times[starts])
     steps = steps[steps > 0]
     # Without gaps and rows that are there twice.
     usual = steps[(steps < 1.75 * np.median(steps)) & (steps > 0.25 * np.median(steps))] if len(steps) else steps
@@ -151,12 +149,6 @@ def on_grid(
         )  # fmt: skip
     counts = {'samples': len(index), 'lost': lost, **{reason: count for reason, count in left_out.items() if count}}
     return rows, index - index[0], Counter(counts)
-
-
-def runs(mask: AnyArray) -> list[slice]:
-    """Return the stretches of a mask that are true."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
-    return [slice(*edge) for edge in edges.reshape(-1, 2).tolist()]
 
 
 def _places(times: Array, rate_hz: float, out: int, *, stated: bool) -> AnyArray:
@@ -244,13 +236,14 @@ def _tick_s(times: Array) -> float:
 
 def with_places(times: Array, kept: AnyArray) -> Array:
     """Return times in which malformed rows that stand for a sample, as the step around them shows, have its time."""
-    times = times.copy()
+    known = np.flatnonzero(np.isfinite(times))
     steps = np.diff(times[kept & np.isfinite(times)])
-    usual = float(np.median(steps)) if len(steps) else math.nan
-    for run in runs(kept & np.isnan(times)):
-        before, after = run.start - 1, run.stop
-        if before >= 0 and after < len(times):
-            step = (times[after] - times[before]) / (after - before)
-            if abs((step / usual - 1.0) * (after - before)) < 0.5:
-                times[run] = times[before] + step * np.arange(1, after - before)
-    return times
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    gaps = np.flatnonzero(kept & np.isnan(times))
+    gaps = gaps[(gaps > known[0]) & (gaps < known[-1])] if usual > 0 else gaps[:0]
+    after = np.searchsorted(known, gaps)
+    count, step = np.diff(known)[after - 1], np.diff(times[known])[after - 1]
+    one = np.abs(step / usual - count) < 0.5 if usual > 0 else gaps > 0
+    filled = times.copy()
+    filled[gaps[one]] = (times[known[after - 1]] + step * (gaps - known[after - 1]) / count)[one]
+    return filled

@@ -56,7 +56,7 @@ def _checked_template(template: str) -> None:
 
 
 TIME_UNITS: Mapping[str, float] = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'min': 60.0}
-BORDERS = ('file', 'column', 'pause', 'time', 'row')
+BORDERS = ('file', 'column', 'pause', 'row')
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ class SlideBorders:
     by: str = param(
         'file',
         "Says what ends a slide: 'file' (each file or table is one slide), 'column' (a value changes), 'pause' (time "
-        "jumps by `pause_s` or back), 'time' (every `length_s`) or 'row' (each row is one, see `samples_per_row`).",
+        "jumps by `pause_s`, also back) or 'row' (each row is one, see `samples_per_row`).",
         choices=BORDERS,
     )
     column: str = param('', "Names the column whose value changes between slides, for 'column'.")
@@ -149,9 +149,6 @@ class SlideBorders:
         "Values of the column at which the finger slides, or patterns of them ('pass *'); [] takes all but empty ones.",
     )
     pause_s: float = param(0.5, "Shortest pause between slides, for 'pause'.", unit='s', low=0.0)
-    length_s: float = param(5.0, "Length of a slide, for 'time'.", unit='s', low=0.05)
-    start_s: float = param(0.0, 'Time at the start of each slide that is left out.', unit='s', low=0.0)
-    end_s: float = param(0.0, 'Time at the end of each slide that is left out.', unit='s', low=0.0)
     min_s: float = param(0.2, 'Shortest slide that is kept; shorter ones are counted.', unit='s', low=0.0)
 
 

@@ -13,7 +13,8 @@ import re
 import struct
 import warnings
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -26,7 +27,7 @@ import numpy as np
 from texture_core.config import MB, Arrays, library, open_regular, read_array, unknown_name
 from texture_core.errors import InvalidData, MissingLibrary
 from texture_core.types import MAX_HZ, NANOSECONDS, AnyArray, Array
-from texture_recordings.bags import RawMessage, is_bag, message_types, read_foreign
+from texture_recordings.bags import is_bag, message_types, read_foreign
 from texture_recordings.mapping import FileFormat, TableMapping, template_fields
 
 MAX_FILE_BYTES = 1000 * MB
@@ -645,8 +646,11 @@ def _texts(array: AnyArray) -> AnyArray:
 
 MAX_FIELDS = 2000  # of one message
 Rows = Mapping[str, AnyArray]  # name → values of one message, (n,) each; n > 1 where it holds consecutive samples
+Messages = Mapping[str, Sequence[tuple[Rows, int, int, str]]]  # by topic: values, stamp and time of logging, ns, frame
 BROKEN = (struct.error, UnicodeDecodeError, ValueError, IndexError, AssertionError, KeyError, TypeError)
 TIME, FRAME = 'time', 'header.frame_id'
+AXES = ('samples', 'channels')
+OTHER_CLOCK_NS = NANOSECONDS  # stamps that differ more from the time of logging are of another clock
 
 
 def _collect(value: Any, path: str, found: dict[str, AnyArray]) -> None:
@@ -666,21 +670,6 @@ def _collect(value: Any, path: str, found: dict[str, AnyArray]) -> None:
         found[path] = np.array([value])
 
 
-AXES = ('samples', 'channels')
-
-
-def _by_samples(data: AnyArray, axes: Sequence[Any]) -> AnyArray:
-    """Return an array of two dimensions as (n_samples, n_channels), as their labels name them."""
-    labels = tuple(axis.label.strip().lower() for axis in axes)
-    table: AnyArray = data.reshape([axis.size for axis in axes])
-    if labels not in (AXES, AXES[::-1]):
-        raise InvalidData(
-            f"its dimensions are named '{labels[0]}' and '{labels[1]}', which does not tell samples from channels; "
-            "republish it with the labels 'samples' and 'channels'"
-        )
-    return table if labels == AXES else table.T
-
-
 def _rows_of(value: Any, msgtype: str) -> Rows:
     """Return the values of a message by name; of an array of two dimensions, consecutive rows."""
     if msgtype == 'sensor_msgs/msg/JointState':
@@ -690,8 +679,16 @@ def _rows_of(value: Any, msgtype: str) -> Rows:
             for kind in kinds for joint, number in zip(value.name, getattr(value, kind), strict=False)
         }  # fmt: skip
     if msgtype in ('std_msgs/msg/Float32MultiArray', 'std_msgs/msg/Float64MultiArray'):
-        data = value.data[value.layout.data_offset :]
-        table = _by_samples(data, value.layout.dim) if len(value.layout.dim) == 2 else data[None]
+        axes, table = value.layout.dim, value.data[value.layout.data_offset :][None]
+        if len(axes) == 2:
+            table = table.reshape([axis.size for axis in axes])
+            labels = tuple(axis.label.strip().lower() for axis in axes)
+            if labels not in (AXES, AXES[::-1]):
+                raise InvalidData(
+                    f"its dimensions are named '{labels[0]}' and '{labels[1]}', which does not tell samples from "
+                    "channels; republish it with the labels 'samples' and 'channels'"
+                )
+            table = table if labels == AXES else table.T
         if table.shape[1] > MAX_FIELDS:
             raise ValueError(f'it has {table.shape[1]} channels; {MAX_FIELDS} are allowed')
         return {f'data.{number}': table[:, number] for number in range(table.shape[1])}
@@ -708,139 +705,103 @@ def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
     """
     columns_of_streams = [column for stream in mapping.streams.values() for column in stream.columns]
     wanted = {*columns_of_streams, *mapping.numbers(), *mapping.texts()}
-    topics: dict[str, _Topic] = {}
+    messages = _messages(path, place, wanted, take)
+    ahead_ns = _clocks_ahead_ns(messages, place)
+    begin_ns = next(found[0][1] - ahead_ns[name] for name, found in messages.items())
+    columns: dict[str, AnyArray] = {}
+    clocks: dict[str, str] = {}
+    for name, found in messages.items():
+        all_rows, stamps_ns, _, frames = zip(*found, strict=True)
+        parts = {part: np.concatenate([rows[part] for rows in all_rows]) for part in all_rows[0]}
+        counts = np.array([max(map(len, rows.values()), default=0) for rows in all_rows])
+        if f'{name}/{FRAME}' in wanted:
+            parts[FRAME] = np.repeat(np.array(frames), counts)
+        elif len({*frames}) > 1:
+            raise InvalidData(
+                f"'{place}', topic '{name}': its messages have the frames {', '.join(sorted({*frames})[:4])}, so "
+                f"several sensors may publish there; choose one by rows: {{'{name}/{FRAME}': '{min(frames)}'}}"
+            )
+        # The samples of one message lie evenly between it and the next.
+        times_s = (np.array(stamps_ns) - ahead_ns[name] - begin_ns) / NANOSECONDS
+        usual_s = float(np.median(np.diff(times_s))) if len(times_s) > 1 else 0.0
+        steps_s = np.diff(times_s, append=times_s[-1] + usual_s)
+        within = np.concatenate([np.arange(count) / max(count, 1) for count in counts])
+        clock = f'{name}/{TIME}'
+        columns[clock] = np.repeat(times_s, counts) + np.repeat(steps_s, counts) * within
+        columns |= {f'{name}/{part}': array for part, array in parts.items()}
+        clocks |= {f'{name}/{part}': clock for part in parts}
+    yield TableFrame(place, tuple(columns), partial(columns_of, columns, place), clocks=clocks)
+
+
+def _messages(path: Path, place: str, wanted: AbstractSet[str], take: Take) -> Messages:
+    """Return the messages of the topics that are wanted."""
+    messages: dict[str, list[tuple[Rows, int, int, str]]] = {}
     seen: dict[str, Any] = {}
+    types: dict[str, Any] = {}
 
     def chosen(connection: Any) -> bool:
         seen[connection.topic] = connection
         return any(fnmatch.fnmatchcase(connection.topic, name.rpartition('/')[0] or name) for name in wanted)
 
     for message in read_foreign(path, chosen):
-        if message.topic not in topics:
-            topics[message.topic] = _Topic(message.topic, seen[message.topic], place)
-        topics[message.topic].add(message, take)
-    _agree_on_clock(topics.values())
-    first_ns = next((topic.first_ns for topic in topics.values()), 0)
-    columns: dict[str, AnyArray] = {}
-    clocks: dict[str, str] = {}
-    for name, topic in topics.items():
-        clock = f'{name}/{TIME}'
-        columns[clock] = topic.time_s(first_ns)
-        if f'{name}/{FRAME}' in wanted:
-            columns[f'{name}/{FRAME}'], clocks[f'{name}/{FRAME}'] = topic.frame_ids(), clock
-        else:
-            topic.refuse_frames()
-        for part, array in topic.columns().items():
-            columns[f'{name}/{part}'] = array
-            clocks[f'{name}/{part}'] = clock
-    if not columns:
-        raise InvalidData(
-            f"'{place}' has no topic that the mapping names ({', '.join(sorted(wanted))}); it has "
-            f"{', '.join(sorted(seen)) or 'none'}; write columns as topic and field, such as '/wrench/wrench.force.x'"
-        )
-    yield TableFrame(place, tuple(columns), partial(columns_of, columns, place), clocks=clocks)
-
-
-OTHER_CLOCK_NS = NANOSECONDS  # stamps that differ more from the time of logging are of another clock
-
-
-def _agree_on_clock(topics: Iterable[_Topic]) -> None:
-    """Correct the clocks of devices by the times of logging where those of topics differ."""
-    ahead = {topic: topic.ahead_ns() for topic in topics}
-    usual = [usual_ns for usual_ns, _ in ahead.values()]
-    if not usual or max(usual) - min(usual) <= OTHER_CLOCK_NS:
-        return
-    for topic, (usual_ns, change_ns) in ahead.items():
-        if change_ns > OTHER_CLOCK_NS:
-            raise InvalidData(
-                f'{topic.where}: the stamps differ from the times of logging, which other topics have, by '
-                f'{usual_ns / NANOSECONDS:.4g} s, and that changes by {change_ns / NANOSECONDS:.3g} s; record topics '
-                'with stamps of one clock'
-            )
-        topic.shift(-usual_ns)
-
-
-class _Topic:
-    """The messages of one topic as columns, read by the definition that the bag stores, or else that of ROS 2."""
-
-    def __init__(self, name: str, connection: Any, place: str) -> None:
-        self._types, self._msgtype, self._name, self._place = message_types(connection), connection.msgtype, name, place
-        if self._msgtype not in self._types.types:
-            raise InvalidData(
-                f"'{place}': the messages of '{name}' are {self._msgtype}, whose definition is neither in the bag nor "
-                'of ROS 2 itself; record it as MCAP, which stores definitions, or republish it as a standard message'
-            )
-        if self._msgtype.startswith('audio_common_msgs/'):
-            raise InvalidData(f"'{place}': '{name}' is sound whose messages do not tell the format; give a WAV file")
-        self.where = f"'{place}', topic '{name}'"
-        self._rows: list[Rows] = []
-        self._stamps_ns: list[int] = []
-        self._ahead_ns: list[int] = []  # of the time of logging
-        self._counts: list[int] = []
-        self._frames: list[str] = []
-
-    @property
-    def first_ns(self) -> int:
-        """Time of the first message."""
-        return self._stamps_ns[0]
-
-    def ahead_ns(self) -> tuple[int, int]:
-        """Return by how much stamps are ahead of logging, and by how much that changes."""
-        low, usual, high = np.percentile(self._ahead_ns, (5, 50, 95)).tolist()
-        return round(usual), round(high - low)
-
-    def shift(self, by_ns: int) -> None:
-        """Bring all times forward."""
-        self._stamps_ns = [stamp_ns + by_ns for stamp_ns in self._stamps_ns]
-
-    def add(self, message: RawMessage, take: Take) -> None:
-        """Add a message."""
-        where = f"'{self._place}': message {len(self._rows)} of '{self._name}'"
+        name, msgtype = message.topic, message.msgtype
+        if name not in types:
+            types[name] = _types_of(seen[name], place)
+        found = messages.setdefault(name, [])
+        where = f"'{place}': message {len(found)} of '{name}'"
         try:
-            value = self._types.deserialize_cdr(message.data, self._msgtype)
-            rows = _rows_of(value, self._msgtype)
+            value = types[name].deserialize_cdr(message.data, msgtype)
+            rows = _rows_of(value, msgtype)
         except InvalidData as error:
             raise InvalidData(f'{where}: {error}') from error
         except BROKEN as error:
             raise InvalidData(f'{where} is damaged: {error}; record it again') from error
-        if self._rows and rows.keys() != self._rows[0].keys():
-            other = ', '.join(sorted(rows.keys() ^ self._rows[0].keys())[:5])
+        if found and rows.keys() != found[0][0].keys():
+            other = ', '.join(sorted(rows.keys() ^ found[0][0].keys())[:5])
             raise InvalidData(f'{where} has other fields than the first: {other}')
-        self._rows.append(rows)
-        self._counts.append(max((len(array) for array in rows.values()), default=0))
         take(10 * len(rows) + sum(len(array) for array in rows.values()))  # small arrays take more than their values
-        stamp = getattr(getattr(value, 'header', None), 'stamp', None)
-        stamped_ns = stamp.sec * NANOSECONDS + stamp.nanosec if stamp else 0
-        self._stamps_ns.append(stamped_ns or message.log_ns)
-        self._ahead_ns.append(self._stamps_ns[-1] - message.log_ns)
-        self._frames.append(getattr(getattr(value, 'header', None), 'frame_id', ''))
+        header = getattr(value, 'header', None)
+        stamp = getattr(header, 'stamp', None)
+        stamp_ns = stamp.sec * NANOSECONDS + stamp.nanosec if stamp else 0
+        found.append((rows, stamp_ns or message.log_ns, message.log_ns, getattr(header, 'frame_id', '')))
+    if not messages:
+        raise InvalidData(
+            f"'{place}' has no topic that the mapping names ({', '.join(sorted(wanted))}); it has "
+            f"{', '.join(sorted(seen)) or 'none'}; write columns as topic and field, such as '/wrench/wrench.force.x'"
+        )
+    return messages
 
-    def frame_ids(self) -> AnyArray:
-        """Return the frame of each row."""
-        return np.repeat(np.array(self._frames), self._counts)
 
-    def refuse_frames(self) -> None:
-        """Refuse messages of several frames, which are of several sensors."""
-        frames = sorted({*self._frames})
-        if len(frames) > 1:
+def _types_of(connection: Any, place: str) -> Any:
+    """Return the types of the messages of a topic by the definition that the bag stores, or else that of ROS 2."""
+    types, msgtype = message_types(connection), connection.msgtype
+    if msgtype.startswith('audio_common_msgs/'):
+        raise InvalidData(
+            f"'{place}': '{connection.topic}' is sound whose messages do not tell the format; give a WAV file"
+        )
+    if msgtype not in types.types:
+        raise InvalidData(
+            f"'{place}': the messages of '{connection.topic}' are {msgtype}, whose definition is neither in the bag "
+            'nor of ROS 2 itself; record it as MCAP, which stores definitions, or republish it as a standard message'
+        )
+    return types
+
+
+def _clocks_ahead_ns(messages: Messages, place: str) -> dict[str, int]:
+    """Return by how much the clock of each topic is ahead of the recorder's; 0 if all topics have one clock."""
+    ahead = {name: [stamp_ns - log_ns for _, stamp_ns, log_ns, _ in found] for name, found in messages.items()}
+    usual_ns = {name: round(np.median(values)) for name, values in ahead.items()}
+    if max(usual_ns.values()) - min(usual_ns.values()) <= OTHER_CLOCK_NS:
+        return dict.fromkeys(messages, 0)
+    for name, values in ahead.items():
+        low, high = np.percentile(values, (5, 95)).tolist()
+        if high - low > OTHER_CLOCK_NS:
             raise InvalidData(
-                f'{self.where}: its messages have the frames {", ".join(frames[:4])}, so several sensors may publish '
-                f"there; choose one by rows: {{'{self._name}/{FRAME}': '{frames[0]}'}}"
+                f"'{place}', topic '{name}': the stamps differ from the times of logging, which other topics have, by "
+                f'{usual_ns[name] / NANOSECONDS:.4g} s, and that changes by {(high - low) / NANOSECONDS:.3g} s; record '
+                'topics with stamps of one clock'
             )
-
-    def columns(self) -> dict[str, AnyArray]:
-        """Return all columns, (n,) each."""
-        return {name: np.concatenate([rows[name] for rows in self._rows]) for name in self._rows[0]}
-
-    def time_s(self, first_ns: int) -> Array:
-        """Return the time of each row; the samples of one message lie evenly between it and the next."""
-        stamps_s = (np.array(self._stamps_ns) - first_ns) / NANOSECONDS
-        counts = np.array(self._counts)
-        usual = float(np.median(np.diff(stamps_s))) if len(stamps_s) > 1 else 0.0
-        steps_s = np.diff(stamps_s, append=stamps_s[-1] + usual)
-        within = np.concatenate([np.arange(count) / max(count, 1) for count in counts])
-        times: Array = np.repeat(stamps_s, counts) + np.repeat(steps_s, counts) * within
-        return times
+    return usual_ns
 
 
 # --------------------

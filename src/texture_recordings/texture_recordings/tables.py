@@ -267,19 +267,17 @@ class FrameSlides:
         params, short, inside = self._mapping.slides, 0, 0
         reference, times = self._reference, self._reference.at_s()
         for number, span in enumerate(self._spans, 1):
-            skip, drop = (round(seconds * reference.rate_hz) for seconds in (params.start_s, params.end_s))
-            rows = slice(span.start + skip, max(span.start + skip, span.stop - drop))
-            inside += max(0, span.stop - span.start)
-            count = (rows.stop - rows.start) * reference.per_row
-            if count < 2 or count / (reference.rate_hz * reference.per_row) < params.min_s - 1e-9:
-                short += span.stop - span.start
+            rows = span.stop - span.start
+            count, inside = rows * reference.per_row, inside + rows
+            if count < 2 or rows / reference.rate_hz < params.min_s - 1e-9:
+                short += rows
                 self._report.leave_out(
                     'slides are too short', 1, f"'{self._place}', row {self._line(span.start)}: {count} samples"
                 )
                 continue
             if number > MAX_SLIDES:
                 raise InvalidData(f"'{self._place}' has more than {MAX_SLIDES} slides; split it")
-            yield self._slide(times, rows, number)
+            yield self._slide(times, span, number)
         if short > MAX_LEFT_OUT * inside and short < inside and params.min_s == SlideBorders().min_s:
             raise InvalidData(
                 f"'{self._place}': {short} of {inside} rows lie in slides that are shorter than {params.min_s:g} s; "
@@ -342,16 +340,13 @@ class FrameSlides:
 
     def _check_shared_rows(self) -> None:
         """Refuse stated rates that contradict the rows which two streams without times share."""
-        rates: dict[tuple[str, int], dict[str, float]] = {}
-        for one in self._streams:
-            if one.time_s is None and len(one.rows) > 1:
-                rates.setdefault(one.group, {})[one.name] = one.rate_hz / float(np.median(np.diff(one.rows)))
-        for found in rates.values():
-            if max(found.values()) > SAME_RATE * min(found.values()):
-                stated = ', '.join(f"{rate_hz:.4g} by '{name}'" for name, rate_hz in found.items())
-                raise InvalidData(
-                    f"'{self._place}': rows per second are {stated}, which share their rows; correct `rate_hz`"
-                )
+        rates = {one.name: one.rate_hz for one in self._streams
+                 if one.time_s is None and one.group == self._reference.group}  # fmt: skip
+        if max(rates.values(), default=1.0) > SAME_RATE * min(rates.values(), default=1.0):
+            stated = ', '.join(f"{rate_hz:.4g} by '{name}'" for name, rate_hz in rates.items())
+            raise InvalidData(
+                f"'{self._place}': rows per second are {stated}, which share their rows; correct `rate_hz`"
+            )
 
     def _line(self, row: int) -> int:
         lines = self._columns.lines
@@ -370,13 +365,10 @@ class FrameSlides:
             for other, columns in self._chosen.items() if other != name
             for column in columns if self._group(column) == group
         ]  # fmt: skip
-        none = np.logical_and.reduce([np.isnan(self._columns.numbers[column]) for column in self._chosen[name]])
-        if not others:
+        if not others or not self._mapping.streams[name].time.column:
             return np.zeros(group[1], dtype=bool)
+        none = np.logical_and.reduce([np.isnan(self._columns.numbers[column]) for column in self._chosen[name]])
         blank: AnyArray = none & np.logical_or.reduce([np.isfinite(column) for column in others])
-        steps = np.diff(np.flatnonzero(~blank))
-        if not self._mapping.streams[name].time.column and len(steps) and np.ptp(steps):
-            blank[:] = False  # by no clock and no pattern can their places be known
         return blank
 
     def _check_rows(self) -> None:
@@ -444,7 +436,8 @@ class FrameSlides:
             unit = TIME_UNITS[params.time.unit if params.time.column else 's']
             time_s = unwrapped(raw[kept]) * unit
         else:  # rows without any number above the samples and below them are none
-            known = np.flatnonzero(np.isfinite(samples).any(axis=1))
+            numbers = [one for one in self._columns.numbers.values() if len(one) == len(kept)]
+            known = np.flatnonzero(np.isfinite(numbers).any(axis=0))
             kept[: known[0]] = kept[known[-1] + 1 :] = False
         rows = np.flatnonzero(kept)
         self._report.channels.setdefault(name, channels)
@@ -491,21 +484,7 @@ class FrameSlides:
             steps = np.diff(times)
             changes = np.flatnonzero(np.abs(steps) >= params.pause_s) + 1
             self._refuse_copies(reference, times, np.flatnonzero(steps <= -params.pause_s) + 1)
-        elif params.by == 'time':
-            if times is not None and (np.diff(times) < 0).any():
-                row = int(np.argmax(np.diff(times) < 0)) + 1
-                raise InvalidData(self._fault(reference, row, 'time goes back; slides by time need one that goes on'))
-            rate_hz = reference.params.rate_hz / reference.per_row or self._frame.rate_hz
-            since = times - times[0] if times is not None else reference.rows / max(rate_hz, MIN_HZ)
-            number = np.floor(since / params.length_s + 1e-9)
-            changes = np.flatnonzero(np.diff(number)) + 1
-            whole = float(since[-1]) + float(np.median(np.diff(since))) if count > 1 else 0.0
-            count = (
-                count
-                if whole >= (number[-1] + 1) * params.length_s * (1 - 1e-6)
-                else int((changes if len(changes) else [0])[-1])
-            )
-        found = [slice(first, last) for first, last in pairwise([0, *changes[changes < count].tolist(), count])]
+        found = [slice(first, last) for first, last in pairwise([0, *changes.tolist(), count])]
         if keys is None:
             return found
         found = [span for span in found if _slides_at(str(keys[span.start]), params.values)]
@@ -535,18 +514,8 @@ class FrameSlides:
         name, params, per_row = stream.name, stream.params, stream.per_row
         measured, burst_s = self._frame.rate_hz, 0.0
         if stream.time_s is not None:
-            parts = [stream.time_s]
-            if stream.group == self._reference.group:
-                edges = [
-                    (self._reference.rows[one.start], self._reference.rows[one.stop - 1])
-                    for one in self._spans
-                    if one.stop > one.start
-                ]
-                places = [(np.searchsorted(stream.rows, a), np.searchsorted(stream.rows, b, 'right')) for a, b in edges]
-                parts = [stream.time_s[a:b] for a, b in places] or parts
-            parts = [part for part in parts if len(part) > 1] or [stream.time_s]
-            burst_s = burst_step_s(np.concatenate([np.diff(part) for part in parts]))
-            measured = per_row * estimated_rate_hz(parts, burst_s)
+            burst_s = burst_step_s(np.diff(stream.time_s))
+            measured = per_row * estimated_rate_hz(stream.time_s, burst_s)
             if not measured > 0:
                 raise InvalidData(
                     f"'{self._place}': the times of '{name}' do not grow from row to row; give a column of time that "
@@ -574,39 +543,36 @@ class FrameSlides:
         return replace(stream, rate_hz=rate_hz / per_row, burst_s=burst_s)
 
     def _aligned(self, name: str) -> AnyArray:
-        """Return the texts of a column at the rows of the reference: of another clock, the last one until then."""
-        texts = self._columns.texts[name]
+        """Return a column at the rows of the reference: of another clock, the last value until then."""
+        columns = self._columns
+        values: AnyArray = columns.texts[name] if name in columns.texts else columns.numbers[name]
         if self._group(name) == self._reference.group:
-            return texts[self._reference.rows]
+            return values[self._reference.rows]
         clock, times = self._frame.clocks.get(name), self._reference.time_s
         if clock is None or times is None:
             raise InvalidData(
-                f"'{self._place}': column '{name}' has {len(texts)} rows, as no stream has; name one of the same length"
+                f"'{self._place}': column '{name}' has {len(values)} rows, as no stream has; name one of the same "
+                'length'
             )
-        held = np.searchsorted(self._columns.numbers[clock], times + SAME_TIME_S, 'right') - 1
-        return np.where(held >= 0, texts[np.maximum(held, 0)], '')
+        held = np.searchsorted(columns.numbers[clock], times + SAME_TIME_S, 'right') - 1
+        return np.where(held >= 0, values[np.maximum(held, 0)], '' if name in columns.texts else math.nan)
 
     def _value(self, name: str, rows: slice, kind: str) -> str:
         """Return the one value that a column has during a slide, the last one before it where it has none."""
         if name in self._fields:
             return str(self._fields[name])
-        texts = self._aligned(name)
-        inside = np.flatnonzero(texts[rows] != '') + rows.start
-        before = np.flatnonzero(texts[: rows.start] != '')
-        if not len(inside):
-            if not len(before):
-                raise InvalidData(f"'{self._place}': column '{name}' has no value during a slide; name another")
-            return str(texts[before[-1]])
-        first = str(texts[inside[0]])
-        if inside[0] > rows.start and len(before) and texts[before[-1]] != first:
-            inside, first = np.append(before[-1], inside), str(texts[before[-1]])
-        other = inside[texts[inside] != first]
+        texts = self._aligned(name)[: rows.stop]
+        held = texts[np.maximum.accumulate(np.where(texts != '', np.arange(len(texts)), 0))][rows]
+        known = np.flatnonzero(held != '')
+        if not len(known):
+            raise InvalidData(f"'{self._place}': column '{name}' has no value during a slide; name another")
+        first = str(held[known[0]])
+        other = known[held[known] != first]
         if len(other):
             raise InvalidData(
-                f"'{self._place}', row {self._line(self._reference.rows[other[0]])}, column '{name}': the "
-                f"{kind} changes from '{first}' to '{texts[other[0]]}' within a slide; let slides end "
-                f"where '{name}' changes "
-                '(`slides: {by: column}`)'
+                f"'{self._place}', row {self._line(self._reference.rows[rows.start + other[0]])}, column '{name}': the "
+                f"{kind} changes from '{first}' to '{held[other[0]]}' within a slide; let slides end where '{name}' "
+                'changes (`slides: {by: column}`)'
             )
         return first
 
@@ -625,7 +591,7 @@ class FrameSlides:
             )
         group_rows = reference.rows[rows.start], reference.rows[rows.stop - 1] + 1
         streams = {one.name: self._samples(one, surface, group_rows, begin_s, end_s) for one in self._streams}
-        conditions = self._conditions(group_rows, begin_s, end_s)
+        conditions = self._conditions(times, rows, begin_s, end_s)
         for place, name in enumerate(CONDITION_UNITS, 1):
             known = [state[place] for state in conditions if math.isfinite(state[place])]
             if known:
@@ -706,9 +672,9 @@ class FrameSlides:
             + (f', which may be {" or ".join(likely)}' if likely else '')
         )
 
-    def _conditions(self, group_rows: tuple[int, int], begin_s: float, end_s: float) -> Conditions:
+    def _conditions(self, times: Array, rows: slice, begin_s: float, end_s: float) -> Conditions:
         """Return what holds from 0 on, and every 0.1 s after if a condition changes along the slide."""
-        tracks = {name: self._track(name, group_rows, begin_s, end_s) for name in CONDITION_UNITS}
+        tracks = {name: self._track(name, times, rows) for name in CONDITION_UNITS}
         changing = any(len(values) > 1 and np.ptp(values) > 0 for _, values in tracks.values())
         count = max(1, round((end_s - begin_s) / STATE_S)) if changing else 1
         edges = begin_s + STATE_S * np.arange(count + 1) if changing else np.array([begin_s, math.inf])
@@ -716,36 +682,20 @@ class FrameSlides:
         means = [[_mean(*tracks[name], a, b) for name in CONDITION_UNITS] for a, b in pairwise(edges)]
         return [(start, *mean) for start, mean in zip((edges[:-1] - begin_s).tolist(), means, strict=True)]
 
-    def _track(self, name: str, group_rows: tuple[int, int], begin_s: float, end_s: float) -> tuple[Array, Array]:
+    def _track(self, name: str, times: Array, rows: slice) -> tuple[Array, Array]:
         """Return times and known values of a condition in SI units, (n,) each; a force and a speed without sign."""
         quantity = self._mapping.conditions.get(name, Quantity())
         factor = CONDITION_UNITS[name].get(quantity.unit, 1.0)
         if quantity.column in self._fields or not quantity.column:
             text = self._fields[quantity.column] if quantity.column else quantity.value or 'nan'
             try:
-                values, times = np.array([float(text)]), np.array([begin_s])
+                times, values = times[rows][:1], np.array([float(text)])
             except ValueError as error:
                 raise InvalidParameter(
                     f"'{self._place}': '{quantity.column}' is '{text}' in its name; a number is needed there"
                 ) from error
         else:
-            times = np.empty(0)
-            values, group = self._columns.numbers[quantity.column], self._group(quantity.column)
-            if group == self._reference.group:
-                low, high = np.searchsorted(self._reference.rows, group_rows)
-                rows = self._reference.rows[low:high]
-                times, values = self._reference.at_s()[low:high], values[rows]
-            else:
-                clock = self._frame.clocks.get(quantity.column)
-                if clock is None:
-                    raise InvalidData(
-                        f"'{self._place}': column '{quantity.column}' has {len(values)} rows, as no stream has; name "
-                        'one of the same length'
-                    )
-                times = self._columns.numbers[clock]
-                first, last = np.searchsorted(times, (begin_s - SAME_TIME_S, end_s - SAME_TIME_S))
-                first = max(0, first - 1) if first == last else first  # the last value holds
-                times, values = times[first:last], values[first:last]
+            times, values = times[rows], self._aligned(quantity.column)[rows]
         times, values = times[np.isfinite(values)], values[np.isfinite(values)] * factor
         negative = name != 'direction' and len(values) and values.mean() < 0
         return times, -values if negative else values

@@ -58,16 +58,10 @@ def _import(options: argparse.Namespace) -> int:
     return 0
 
 
-def source_folder(source: str, data_set: str) -> Path:
-    """Return the given folder of a data set, or its subfolder that has the name of the data set."""
-    inside = Path(source) / data_set
-    return inside if inside.is_dir() else Path(source)
-
-
 def _import_known(options: argparse.Namespace) -> list[Path]:
     importer = find(IMPORTS, options.data_set, 'data set')
     source, out = options.places
-    return importer(source_folder(source, options.data_set), out, options.slides, options.materials)
+    return importer(source, out, options.slides, options.materials)
 
 
 def _import_mapped(options: argparse.Namespace) -> list[Path]:
