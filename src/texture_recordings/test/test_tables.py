@@ -165,6 +165,7 @@ def test_a_label_that_changes_within_a_slide_is_refused_with_its_row(tmp_path: P
         ({'slides': {'by': 'label'}}, 'mapping, slides: .* allowed is one of file, column, pause, row'),
         ({'conditions': {'speed': {'unit': 'mph'}}}, "the unit of speed is 'mph'; use one of m/s, cm/s, mm/s"),
         ({'files': '{a}{b}.csv'}, 'fields without text between'),
+        ({'files': '{a}_{a}.csv'}, 'has a field twice'),
         ([], 'a mapping of parameter names to values is needed'),
         ({'streams': {'signal': {'columns': ['a'], 'scale': math.inf}}}, "'scale' is inf; allowed is a finite number"),
         (
@@ -224,16 +225,6 @@ def test_values_at_which_the_finger_slides_may_be_patterns(tmp_path: Path) -> No
     assert lengths(save(tmp_path, x=np.arange(330.0), k=phases), mapping) == [110, 120, 30]
 
 
-def test_a_pause_or_a_time_that_begins_again_ends_a_slide(tmp_path: Path) -> None:
-    time_s = np.concatenate([np.arange(100) / 100, 3.0 + np.arange(150) / 100, np.arange(120) / 100])
-    mapping = mapping_from({
-        'streams': {'signal': {'columns': ['x'], 'time': {'column': 't'}}},
-        'label': {'value': 'cork'},
-        'slides': {'by': 'pause', 'pause_s': 1.0},
-    })  # fmt: skip
-    assert lengths(save(tmp_path, x=np.arange(370.0), t=time_s), mapping) == [100, 150, 120]
-
-
 def test_trials_of_arrays_for_machine_learning_are_slides(tmp_path: Path) -> None:
     mapping = mapping_from({
         'streams': {'signal': {'columns': ['X.*'], 'rate_hz': 500.0}},
@@ -248,12 +239,15 @@ def test_trials_of_arrays_for_machine_learning_are_slides(tmp_path: Path) -> Non
     np.testing.assert_allclose(read[1], samples[3], atol=1e-6)
 
 
-def test_arrays_whose_axes_were_mixed_up_are_put_in_order(tmp_path: Path) -> None:
+def test_arrays_whose_axes_were_mixed_up_are_put_in_order_by_a_shipped_mapping(tmp_path: Path) -> None:
     taxels = np.random.default_rng(0).normal(size=(75, 60))
     mixed = taxels.reshape(6, 75, 10).transpose(1, 0, 2).reshape(75, 60)  # six patches of ten taxels
-    import_tables(load_mapping('icub20'), save(tmp_path, **{'oak/val_0_01': mixed}) / 'in', tmp_path / 'out')
-    [read], _ = SlideDataset.from_bags([tmp_path / 'out']).to_numpy('signal_static')
-    np.testing.assert_allclose(read, taxels, atol=1e-6)
+    slides = {f'{name}/val_{k % 2}_0{k}': mixed for name in ('oak', 'cork') for k in range(3)}
+    import_tables(load_mapping('icub20'), save(tmp_path, **slides) / 'in', tmp_path / 'out')
+    dataset = SlideDataset.from_bags([tmp_path / 'out'])
+    assert dataset.condition('number').tolist() == [1, 2, 3] * 2
+    for read in dataset.to_numpy('signal_static')[0]:
+        np.testing.assert_allclose(read, taxels, atol=1e-6)
 
 
 def test_an_order_of_axes_that_does_not_fit_is_refused(tmp_path: Path) -> None:
@@ -262,15 +256,6 @@ def test_an_order_of_axes_that_does_not_fit_is_refused(tmp_path: Path) -> None:
     mapping = one_channel(format={'reshape': [5, 7], 'axes': [1, 0]})
     with pytest.raises(InvalidData, match=r'an array of the shape \(5, 6\) has 30 values'):
         import_tables(mapping, save(tmp_path, x=np.zeros((5, 6))) / 'in', tmp_path / 'out')
-
-
-def test_a_shipped_mapping_is_found_by_its_name(tmp_path: Path) -> None:
-    slides = {
-        f'material0{m}/val_{k % 2}_0{k}': np.full((75, 60), float(k), np.float32) for m in (1, 2) for k in range(3)
-    }
-    mapping = load_mapping('icub20')
-    assert lengths(save(tmp_path, **slides), mapping) == [75] * 6
-    assert SlideDataset.from_bags([tmp_path / 'out']).condition('number').tolist() == [1, 2, 3] * 2
 
 
 def test_slides_that_are_too_short_are_counted(tmp_path: Path) -> None:
@@ -295,7 +280,7 @@ def test_a_coarse_clock_or_samples_in_batches_are_no_gaps(tmp_path: Path, resolu
 
 
 START_NS = 1_700_000_000 * NANOSECONDS
-IMU_HZ, WRENCH_HZ = 100.0, 50.0
+ACC_HZ, WRENCH_HZ = 100.0, 50.0
 SECONDS = 4.0
 STORE = message_types()
 TYPES = STORE.types
@@ -307,32 +292,17 @@ def header(at_s: float) -> object:
     return TYPES['std_msgs/msg/Header'](stamp=stamp, frame_id='tool')
 
 
-def vector(x: float, y: float = 0.0, z: float = 0.0) -> object:
-    return TYPES['geometry_msgs/msg/Vector3'](x=x, y=y, z=z)
+def vector(x: float, z: float = 0.0) -> object:
+    return TYPES['geometry_msgs/msg/Vector3'](x=x, y=0.0, z=z)
 
 
-def imu(at_s: float) -> object:
-    none = np.zeros(9)
-    return TYPES['sensor_msgs/msg/Imu'](
-        header=header(at_s), orientation=TYPES['geometry_msgs/msg/Quaternion'](x=0.0, y=0.0, z=0.0, w=1.0),
-        orientation_covariance=none, angular_velocity=vector(0.0), angular_velocity_covariance=none,
-        linear_acceleration=vector(np.sin(20 * at_s), 2.0, 3.0), linear_acceleration_covariance=none,
-    )  # fmt: skip
+def acceleration(at_s: float) -> object:
+    return TYPES['geometry_msgs/msg/Vector3Stamped'](header=header(at_s), vector=vector(np.sin(20 * at_s)))
 
 
 def wrench(at_s: float) -> object:
-    inner = TYPES['geometry_msgs/msg/Wrench'](force=vector(0.0, 0.0, 1.0 + at_s), torque=vector(0.0))
+    inner = TYPES['geometry_msgs/msg/Wrench'](force=vector(0.0, 1.0 + at_s), torque=vector(0.0))
     return TYPES['geometry_msgs/msg/WrenchStamped'](header=header(at_s), wrench=inner)
-
-
-def array(at_s: float) -> object:
-    """Two channels, of which ten samples come at once."""
-    dimension = TYPES['std_msgs/msg/MultiArrayDimension']
-    dims = [dimension(label='samples', size=10, stride=20), dimension(label='channels', size=2, stride=2)]
-    times = at_s + np.arange(10) / (10 * WRENCH_HZ)
-    data = np.stack([np.sin(20 * times), times], axis=1).astype(np.float32).ravel()
-    layout = TYPES['std_msgs/msg/MultiArrayLayout'](dim=dims, data_offset=0)
-    return TYPES['std_msgs/msg/Float32MultiArray'](layout=layout, data=data)
 
 
 def joints(at_s: float) -> object:
@@ -347,71 +317,40 @@ def label(at_s: float) -> object:
 
 
 KINDS = {
-    '/imu': (imu, 'sensor_msgs/msg/Imu', IMU_HZ),
+    '/acc': (acceleration, 'geometry_msgs/msg/Vector3Stamped', ACC_HZ),
     '/wrench': (wrench, 'geometry_msgs/msg/WrenchStamped', WRENCH_HZ),
-    '/array': (array, 'std_msgs/msg/Float32MultiArray', WRENCH_HZ),
-    '/joints': (joints, 'sensor_msgs/msg/JointState', IMU_HZ),
-    '/surface': (label, 'std_msgs/msg/String', IMU_HZ),
+    '/joints': (joints, 'sensor_msgs/msg/JointState', ACC_HZ),
+    '/surface': (label, 'std_msgs/msg/String', ACC_HZ),
 }
 
 
-def write_bag(path: Path) -> Path:
-    with Writer(path, version=8, storage_plugin=StoragePlugin.MCAP) as writer:
+def run_bag(folder: Path, streams: dict[str, str], **content: object) -> ImportReport:
+    with Writer(folder / 'foreign', version=8, storage_plugin=StoragePlugin.MCAP) as writer:
         for topic, (make, msgtype, rate_hz) in KINDS.items():
             connection = writer.add_connection(topic, msgtype, typestore=STORE)
             for at_s in np.arange(round(SECONDS * rate_hz)) / rate_hz:
                 data = STORE.serialize_cdr(make(at_s), msgtype)
                 writer.write(connection, START_NS + round(at_s * NANOSECONDS), data)
-    return path
-
-
-def mapping_message_bag(columns: list[str], **content: object) -> TableMapping:
-    return mapping_from({
-        'streams': {'signal': {'columns': columns}},
-        'label': {'column': '/surface/data'},
-        'slides': {'by': 'column', 'column': '/surface/data'},
-        **content,
+    wanted = mapping_from({
+        'streams': {name: {'columns': [column]} for name, column in streams.items()},
+        'label': {'column': '/surface/data'}, 'slides': {'by': 'column', 'column': '/surface/data'}, **content,
     })  # fmt: skip
+    return import_tables(wanted, folder / 'foreign', folder / 'out', MAPPED['bag'])
 
 
-def run_message_bag(folder: Path, wanted: TableMapping) -> ImportReport:
-    return import_tables(wanted, write_bag(folder / 'foreign'), folder / 'out', MAPPED['bag'])
-
-
-@pytest.mark.parametrize(
-    ('column', 'rate_hz'),
-    [
-        ('/imu/linear_acceleration.x', IMU_HZ),
-        ('/array/data.0', 10 * WRENCH_HZ),
-        ('/joints/position.finger', IMU_HZ),
-    ],
-)
-def test_the_numbers_of_standard_messages_are_channels(tmp_path: Path, column: str, rate_hz: float) -> None:
-    report = run_message_bag(tmp_path, mapping_message_bag([column]))
+@pytest.mark.parametrize('column', ['/acc/vector.x', '/joints/position.finger'])
+def test_the_numbers_of_standard_messages_are_channels(tmp_path: Path, column: str) -> None:
+    report = run_bag(tmp_path, {'signal': column})
     assert report.slides == {'cork': 1, 'felt': 1}
-    dataset = SlideDataset.from_bags(report.bags)
-    [samples, _], _ = dataset.to_numpy()
-    assert dataset[0].signals['signal'][0].sampling_rate_hz == pytest.approx(rate_hz, rel=0.002)
-    assert len(samples) == pytest.approx(SECONDS / 2 * rate_hz, rel=0.01)
-    times = np.arange(len(samples)) / rate_hz
-    np.testing.assert_allclose(samples[:, 0], np.sin(20 * times), atol=1e-3)
+    assert report.rates_hz['signal'] == pytest.approx(ACC_HZ, rel=0.002)
+    [samples, _], _ = SlideDataset.from_bags(report.bags).to_numpy()
+    np.testing.assert_allclose(samples[:, 0], np.sin(20 * np.arange(200) / ACC_HZ), atol=1e-3)
 
 
 def test_streams_of_two_rates_and_a_force_along_the_slide_are_cut_at_the_same_times(tmp_path: Path) -> None:
-    wanted = mapping_from({
-        'streams': {
-            'signal': {'columns': ['/imu/linear_acceleration.*']},
-            'signal_static': {'columns': ['/wrench/wrench.force.z']},
-        },
-        'label': {'column': '/surface/data'},
-        'slides': {'by': 'column', 'column': '/surface/data'},
-        'conditions': {
-            'force': {'column': '/wrench/wrench.force.z'},
-            'speed': {'column': '/joints/velocity.finger'},
-        },
-    })  # fmt: skip
-    report = run_message_bag(tmp_path, wanted)
-    dataset = SlideDataset.from_bags(report.bags)
+    conditions = {'force': {'column': '/wrench/wrench.force.z'}, 'speed': {'column': '/joints/velocity.finger'}}
+    streams = {'signal': '/acc/vector.*', 'signal_static': '/wrench/wrench.force.z'}
+    dataset = SlideDataset.from_bags(run_bag(tmp_path, streams, conditions=conditions).bags)
     fast, _ = dataset.to_numpy('signal')
     slow, _ = dataset.to_numpy('signal_static')
     assert [len(samples) for samples in fast] == [200, 200]
@@ -423,29 +362,5 @@ def test_streams_of_two_rates_and_a_force_along_the_slide_are_cut_at_the_same_ti
 
 
 def test_a_bag_without_any_of_the_topics_is_refused(tmp_path: Path) -> None:
-    wanted = mapping_from({'streams': {'signal': {'columns': ['/nothing/x']}}, 'label': {'value': 'cork'}})
     with pytest.raises(InvalidData, match=r"'foreign' has no topic that the mapping names \(/nothing/x\)"):
-        run_message_bag(tmp_path, wanted)
-
-
-def test_a_header_in_the_coding_of_windows_is_read(tmp_path: Path) -> None:
-    rows = '\n'.join(f'{number / 100};{number % 7}' for number in range(200))
-    (tmp_path / 'cork.csv').write_bytes(f't [s];a_x [m/s²]\n{rows}\n'.encode('cp1252'))
-    (tmp_path / 'mapping.yaml').write_text(
-        "files: '{material}.csv'\n"
-        "streams: {signal: {columns: ['a_x [m/s²]'], time: {column: 't [s]'}}}\n"
-        'label: {column: material}\n',
-        encoding='utf-8',
-    )
-    import_tables(load_mapping(tmp_path / 'mapping.yaml'), tmp_path, tmp_path / 'bags')
-    [slide] = SlideDataset.from_bags([tmp_path / 'bags'])
-    assert slide.surface == 'cork'
-
-
-def test_decimal_commas_that_the_mapping_does_not_name_are_recognised(tmp_path: Path) -> None:
-    (tmp_path / 'cork.csv').write_text('t;a\n' + ''.join(f'{number};0,5\n' for number in range(200)))
-    (tmp_path / 'mapping.yaml').write_text(
-        "files: '{material}.csv'\nstreams: {signal: {columns: [a], rate_hz: 100.0}}\nlabel: {column: material}\n"
-    )
-    with pytest.raises(InvalidData, match="'0,5' is not a finite number; if commas are decimal"):
-        import_tables(load_mapping(tmp_path / 'mapping.yaml'), tmp_path, tmp_path / 'bags')
+        run_bag(tmp_path, {'signal': '/nothing/x'}, label={'value': 'cork'}, slides={})
