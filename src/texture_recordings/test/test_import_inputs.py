@@ -338,7 +338,7 @@ CONTAINERS: dict[str, tuple[Write, dict, Truth]] = {
     'two sounds': (wav(2 * N, 2), SOUND, 'has 2 chunks of sound'),
     'trials as one slide': (
         npz(X=np.ones((20, 100, 3))), {**ANY, 'streams': {'signal': {'columns': ['X.*'], 'rate_hz': 100.0}}},
-        r'20 trials; write slides: \{by: column, column: trial\}',
+        r'has trials; write slides: \{by: column, column: trial\}',
     ),
     'a folder': (both(csv(T, X), lambda folder: (folder / 'felt_1.csv').mkdir()), {}, "'felt_1.csv' is a folder"),
 }  # fmt: skip

@@ -98,7 +98,7 @@ def on_grid(
     """
     # Rows that are there once more are none; those of a buffer have one time, and may have one value.
     fresh: AnyArray = np.ones(len(times), dtype=bool)
-    if not burst_s:
+    if not burst_s and (np.diff(times) <= 0).any():
         _, first = np.unique(np.column_stack([times, samples]), axis=0, return_index=True, equal_nan=True)
         fresh = np.isin(np.arange(len(times)), first)
     rows = np.flatnonzero(fresh)
@@ -205,7 +205,7 @@ def _burst_places(
         raise ClockFault(1, 'most rows are there twice, with one time and the same values; save each row once')
     # Nobody knows which row a burst of another size lacks; a slide may begin and end within one.
     size = int(np.median(counts))
-    if (counts[1:-1] != size).any():
+    if (counts[1:-1] != size).any() or size not in counts:
         raise ClockFault(
             0, f'rows come in bursts of {counts.min()} to {counts.max()}, so lost rows cannot be told; by rows and '
             f'duration the rate is {len(times) / max(times[-1] - times[0], 1e-9):.4g} Hz; {WITHOUT_TIME}',

@@ -66,7 +66,6 @@ class TableFrame:
     fields: Mapping[str, str] = field(default_factory=dict)
     rate_hz: float = 0.0
     clocks: Mapping[str, str] = field(default_factory=dict)  # column → column of its times, s
-    trials: int = 0  # of arrays (n_trials, n_samples, n_channels)
 
     def chosen(self, wanted: Sequence[str]) -> list[str]:
         """Return the columns that names, patterns such as 'taxel*' and ranges such as '0-8' mean, in their order."""
@@ -169,7 +168,7 @@ def _csv_columns(  # noqa: PLR0917 – bound one after the other
     path: Path, place: str, form: FileFormat, names: Sequence[str], take: Take,
     numbers: Sequence[str], texts: Sequence[str], most: int | None = None,
 ) -> Columns:  # fmt: skip
-    numeric = list(names)
+    numeric = [name for name in names if name not in texts]
     blocks: list[dict[str, AnyArray]] = []
     reasons: dict[int, str] = {}
     with open_regular(path) as opened:
@@ -184,7 +183,7 @@ def _csv_columns(  # noqa: PLR0917 – bound one after the other
             _refuse_commas(columns, numbers, form, place)
             parsed = {name: _parsed(columns[name], form.decimal) for name in {*numeric, *numbers}}
             if not blocks:
-                numeric = [name for name in names if np.isfinite(parsed[name]).mean() > NUMERIC]
+                numeric = [name for name in numeric if np.isfinite(parsed[name]).mean() > NUMERIC]
             # A row is malformed if it has other cells than the first one, or a text for a number that is wanted.
             junk, odd = ~whole, ~whole
             found = {
@@ -566,10 +565,7 @@ def _frames(
             take(array.size * max(1.0, array.dtype.itemsize / 8))
             arrays[column] = _arranged(array, mapping.format, within)
         columns, constants = _unfolded_columns(arrays, within)
-        yield TableFrame(
-            within, tuple(columns), partial(columns_of, columns, within), {**constants, **fields},
-            trials=max((array.shape[0] for array in arrays.values() if array.ndim == 3), default=0),
-        )  # fmt: skip
+        yield TableFrame(within, tuple(columns), partial(columns_of, columns, within), {**constants, **fields})
 
 
 def _arranged(array: AnyArray, form: FileFormat, place: str) -> AnyArray:

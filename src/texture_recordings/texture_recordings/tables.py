@@ -54,7 +54,17 @@ from texture_recordings.mapping import (
     TableMapping,
     template_fields,
 )
-from texture_recordings.readers import EXAMPLES, MAPPED, OTHER_KINDS, Columns, TableFrame, frames, kind_of, number_of
+from texture_recordings.readers import (
+    EXAMPLES,
+    MAPPED,
+    OTHER_KINDS,
+    TRIAL,
+    Columns,
+    TableFrame,
+    frames,
+    kind_of,
+    number_of,
+)
 
 PLAUSIBLE_HZ, LIKELY_HZ = (5.0, 200_000.0), (20.0, 20_000.0)
 LONGEST_SLIDE_S = 1800.0
@@ -258,8 +268,8 @@ class FrameSlides:
         self._streams = [self._rated(one) for one in streams]
         self._check_shared_rows()
         untimed = any(one.time_s is None for one in self._streams)
-        if frame.trials > 1 and mapping.slides.by != 'column' and untimed:
-            raise InvalidData(f"'{self._place}' has {frame.trials} trials; write slides: {{by: column, column: trial}}")
+        if TRIAL in frame.names and mapping.slides.by != 'column' and untimed:
+            raise InvalidData(f"'{self._place}' has trials; write slides: {{by: column, column: {TRIAL}}}")
         self._reference = next(one for one in self._streams if one.name == self._reference.name)
 
     def slides(self) -> Iterator[tuple[str, ExplorationState, SlideStreams, Conditions]]:
