@@ -103,6 +103,10 @@ CLOCKS: dict[str, tuple[Write, dict, Truth]] = {
     'ms at 1000 Hz that are stated': (
         csv((T[~LOST] / 10).round(3), X[~LOST]), timed(rate_hz=1000.0), [('cork', HOLED)],
     ),
+    'a gap': (
+        csv(np.where(T < 3, T, T + 0.07).round(2), X), timed(rate_hz=100.0),
+        [('cork', np.insert(X, 300, [np.nan] * 7))],
+    ),
     'a counter of 16 bits in ms': (csv((6e4 * T).astype(int) % 2**16, X), timed('ms'), 'rate of .* is 1.667 Hz'),
     'a counter of 16 bits in us': (csv((1e6 * T).astype(int) % 2**16, X), timed('us'), CORK),
     'a counter of 32 bits in us': (csv(((1e6 * T).astype(int) + 2**32 - 10**6) % 2**32, X), timed('us'), CORK),
@@ -176,6 +180,15 @@ LABELS: dict[str, tuple[Write, dict, Truth]] = {
     'a code with an underscore': (
         coded(['1_0'] * 300 + ['10'] * 300),
         {**CODES, 'label': {'column': 'l', 'names': {10: 'felt'}}}, [('1_0', X[:300]), ('felt', X[300:])],
+    ),
+    'a label that changes within a slide': (
+        csv(T, X, ['cork'] * 300 + ['felt'] * 300, names='t,x,l'), {'label': {'column': 'l'}},
+        r"row 302, column 'l': the label changes from 'cork' to 'felt' within a slide",
+    ),
+    'patterns of values': (
+        csv(T, X, np.repeat(['idle', 'pass_1', 'back', 'pass_2', '[x]'], N // 5), names='t,x,l'),
+        {'slides': {'by': 'column', 'column': 'l', 'values': ['pass_*', '[x]']}},
+        [('cork', X[120:240]), ('cork', X[360:480]), ('cork', X[480:])],
     ),
     'nan outside slides': (coded(['nan'] * 100 + ['0'] * 500), CODES, [('cork', X[100:])]),
     'floats with NaN': (
