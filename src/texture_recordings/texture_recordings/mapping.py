@@ -107,7 +107,11 @@ class StreamColumns:
         0.0, 'Sampling rate; 0 takes it from the column of time, or from the file.', unit='Hz', low=0.0, high=MAX_HZ
     )
     samples_per_row: int = param(
-        0, 'Number of successive columns that are consecutive samples of one channel; 0 as 1.', low=0, high=1_000_000
+        0,
+        'Number of successive columns that are consecutive samples of one channel; 0 as 1, for three columns at most '
+        'that count up.',
+        low=0,
+        high=1_000_000,
     )
     time: TimeColumn = field(default_factory=TimeColumn)
 

@@ -259,24 +259,21 @@ class FrameSlides:
         self._columns = self._read()
         self._refuse_alternating()
         self._check_rows()
-        streams = [self._stream(name, params) for name, params in mapping.streams.items()]
+        self._streams = [self._rated(self._stream(name, params)) for name, params in mapping.streams.items()]
         # Slides are cut by the rows of the stream that corresponds to the column at which they end.
         by = mapping.slides.column
-        same = [one for one in streams if by and by not in self._fields and one.group == self._group(by)]
-        self._reference = max(same or streams[:1], key=lambda one: len(one.rows))
-        self._spans = self._cut()
-        self._streams = [self._rated(one) for one in streams]
+        same = [one for one in self._streams if by and by not in self._fields and one.group == self._group(by)]
+        self._reference = max(same or self._streams[:1], key=lambda one: len(one.rows))
         self._check_shared_rows()
         untimed = any(one.time_s is None for one in self._streams)
         if TRIAL in frame.names and mapping.slides.by != 'column' and untimed:
             raise InvalidData(f"'{self._place}' has trials; write slides: {{by: column, column: {TRIAL}}}")
-        self._reference = next(one for one in self._streams if one.name == self._reference.name)
 
     def slides(self) -> Iterator[tuple[str, ExplorationState, SlideStreams, Conditions]]:
         """Yield what `SlideBags.write` takes."""
         params, short, inside = self._mapping.slides, 0, 0
         reference, times = self._reference, self._reference.at_s()
-        for number, span in enumerate(self._spans, 1):
+        for number, span in enumerate(self._cut(), 1):
             rows = span.stop - span.start
             count, inside = rows * reference.per_row, inside + rows
             if count < 2 or rows / reference.rate_hz < params.min_s - 1e-9:
