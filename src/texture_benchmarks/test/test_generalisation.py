@@ -83,9 +83,9 @@ def test_the_worst_time_counts_for_accepted_but_wrong() -> None:
 def test_a_control_tells_surfaces_that_were_slid_over_in_different_directions() -> None:
     made = slides(count=8, direction_rad=[0.0, 1.5] * 4)
     names = made.names.tolist()
-    trials = [Trial(names, {('halves', 'same'): names})]
-    [(cell, answers)] = answers_of('t', (made, trials), recipe_of, 'direction alone').items()
-    assert cell == ('halves', 'same')
+    trials = [Trial('', names, {('halves', 'same'): names})]
+    [(cell, answers)] = answers_of('t', (made, trials), recipe_of, 'direction alone')
+    assert cell == ('halves', 'same', '')
     assert all(one.ends[END][0] == one.surface for one in answers)
 
 
@@ -114,7 +114,7 @@ def test_what_is_finished_is_not_computed_again_and_what_is_not_is_named(tmp_pat
 def test_without_some_sets_the_others_are_measured_and_these_are_named(tmp_path: Path, monkeypatch, capsys) -> None:
     (tmp_path / 'here').mkdir()
     made = slides(count=8, direction_rad=[0.0, 1.5] * 4)
-    trial = Trial(made.names.tolist(), {(HALVES, 'a row'): made.names.tolist()})
+    trial = Trial('', made.names.tolist(), {(HALVES, 'a row'): made.names.tolist()})
     source = Source(lambda _options: made, {'a part': (('direction alone',), lambda whole: (whole, [trial]))})
     monkeypatch.setattr(generalisation, 'SETS', {'here': source, 'gone': source})
     options = BenchmarkOptions(tmp_path / 'out', tmp_path)

@@ -10,7 +10,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import groupby, product
+from itertools import groupby
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -84,6 +84,7 @@ LONG_NS = 2_000_000_000  # slides from here on have enough windows 0.5 s apart
 class Trial(NamedTuple):
     """One training, and the slides that are tested for each row of a table, by their names."""
 
+    draw: str
     trained: Sequence[str]
     tested: Mapping[tuple[str, str], Sequence[str]]  # by table and row
     all_recipes: bool = True  # or those alone that train within seconds
@@ -102,6 +103,7 @@ class Answer(NamedTuple):
 
 
 END, DECIDED = 'end', 'decided'
+Cell = tuple[str, str, str]  # table, row, draw
 Figures = tuple[str, str, str, dict[str, Any]]  # table, row, recipe, figures
 FINISHED = 'generalisation.jsonl'  # a line for each recipe on each part, as it is finished
 SLOW = ('default', 'vibration-and-taxels')  # begin first
@@ -158,9 +160,21 @@ def _read(chosen: Mapping[str, Source], options: BenchmarkOptions) -> dict[str, 
 def _run_part(slides: Mapping[str, SlideDataset], part: tuple[str, str, str]) -> list[Figures]:
     """Return table, row and figures of each cell of one recipe on one part."""
     source, name, recipe = part
+    found: defaultdict[tuple[str, str], dict[str, list[Answer]]] = defaultdict(lambda: defaultdict(list))
     _, make = SETS[source].parts[name]
-    answers = answers_of(name, make(slides[source]), recipe_of, recipe)
-    return [(table, row, recipe, figures(found)) for (table, row), found in answers.items()]
+    for (table, row, draw), answers in answers_of(name, make(slides[source]), recipe_of, recipe):
+        found[table, row][draw] += answers
+    return [(table, row, recipe, _pooled(draws)) for (table, row), draws in found.items()]
+
+
+def _pooled(draws: Mapping[str, Sequence[Answer]]) -> dict[str, Any]:
+    """Return the figures of all draws together, and the main ones of each."""
+    cell = figures([one for answers in draws.values() for one in answers])
+    if len(draws) > 1:
+        keys = ('accuracy', 'accepted_correct', 'accepted_wrong', 'most_accepted_wrong')
+        each = {draw: figures(answers) for draw, answers in draws.items()}
+        cell['draws'] = {draw: {key: figures_of_draw[key] for key in keys} for draw, figures_of_draw in each.items()}
+    return cell
 
 
 # --------------------
@@ -172,8 +186,8 @@ Tested = Callable[[Sequence[str]], Mapping[str, tuple[Mapping[str, tuple[str, bo
 
 def answers_of(
     part: str, trials: Trials, recipe_named: Callable[[str], Recipe], name: str
-) -> Mapping[tuple[str, str], list[Answer]]:
-    """Return what a recipe answers in the trials of a part, by table and row; its features are computed once."""
+) -> list[tuple[Cell, list[Answer]]]:
+    """Return what a recipe answers in each trial of a part; its features are computed once."""
     dataset, all_trials = trials
     slides = {one.name: one for one in dataset}
     if name in CONTROLS:
@@ -182,14 +196,14 @@ def answers_of(
         long = dataset[0].sliding[-1].stamp_ns - dataset[0].sliding[0].stamp_ns > LONG_NS
         recipe = with_spaced_windows(recipe_named(name)) if name == SVC and long else recipe_named(name)
         fit = _recipe(dataset, recipe, accepts_all=name == SVC)
-    found: defaultdict[tuple[str, str], list[Answer]] = defaultdict(list)
+    found = []
     chosen = [one for one in all_trials if one.all_recipes or name in QUICK_RECIPES]
     for number, trial in enumerate(chosen, 1):
         began_s = time.monotonic()
         test = fit(trial.trained)
-        for cell, names in trial.tested.items():
-            for key, end in test(names).items():
-                found[cell].append(Answer(_cluster(slides[key]), slides[key].surface, *end))
+        for (table, row), names in trial.tested.items():
+            answers = [Answer(_cluster(slides[key]), slides[key].surface, *end) for key, end in test(names).items()]
+            found.append(((table, row, trial.draw), answers))
         took = f'{time.monotonic() - began_s:.0f} s'
         print(f'{part}, {name}: {number} of {len(chosen)} trainings, {took}', flush=True)
     return found
@@ -251,14 +265,14 @@ def _cells(whole: SlideDataset) -> Trials:
             rows: defaultdict[tuple[str, str], list[str]] = defaultdict(list)
             for other, names in enumerate(at):
                 rows[DISTANCE, str(abs(cell - other))] += names
-            trials.append(Trial(names_of(slides, trained, place), rows, every))
+            trials.append(Trial(draw, names_of(slides, trained, place), rows, every))
         for name, chosen in SPACED.items():
             between = [other for other in range(min(chosen) + 1, max(chosen)) if other not in chosen]
             spaced = {
                 (SPACING, f'{name}: {BETWEEN}'): [one for other in between for one in at[other]],
                 (SPACING, f'{name}: {THERE}'): [one for other in chosen for one in at[other]],
             }
-            trials.append(Trial(names_of(slides, trained, *(places[cell] for cell in chosen)), spaced, every))
+            trials.append(Trial(draw, names_of(slides, trained, *(places[cell] for cell in chosen)), spaced, every))
     return slides, trials
 
 
@@ -271,20 +285,29 @@ def _stretches(spans: Mapping[str, Span], trained: Span, slides: SlideDataset) -
             joined |= {one.name: one for one in _joined(parts, _turned(span, mirrored))}
     both = SlideDataset(tuple(joined.values()))
     trials = []
-    for (draw, (before, after)), mirrored in product(DRAWS.items(), (False, True)):
-        there = names_of(both, before, _place(_turned(trained, mirrored)))
-        tested = {(HALVES, row): names_of(both, after, _place(_turned(span, mirrored))) for row, span in spans.items()}
-        trials.append(Trial(there, tested, draw == FIRST_DRAW))
+    for draw, (before, after) in DRAWS.items():
+        for mirrored in (False, True):
+            there = names_of(both, before, _place(_turned(trained, mirrored)))
+            tested = {
+                (HALVES, row): names_of(both, after, _place(_turned(span, mirrored))) for row, span in spans.items()
+            }
+            trials.append(Trial(draw, there, tested, draw == FIRST_DRAW))
     return both, trials
 
 
 def _quarters(slides: SlideDataset) -> Trials:
     """Return trainings on three quarters of a track, tested on the fourth."""
     parts, places = slides.in_parts(4), [f'{number}/4' for number in range(1, 5)]
-    trials = []
-    for (draw, (before, after)), place in product(DRAWS.items(), places):
-        trained = names_of(parts, before, *(other for other in places if other != place))
-        trials.append(Trial(trained, {(HALVES, QUARTER): names_of(parts, after, place)}, draw == FIRST_DRAW))
+    trials = [
+        Trial(
+            draw,
+            names_of(parts, before, *(other for other in places if other != place)),
+            {(HALVES, QUARTER): names_of(parts, after, place)},
+            draw == FIRST_DRAW,
+        )
+        for draw, (before, after) in DRAWS.items()
+        for place in places
+    ]
     return parts, trials
 
 
@@ -326,21 +349,29 @@ def _read_places(options: BenchmarkOptions) -> SlideDataset:
     places_m = rng.uniform(0.0, PATCH_M, (2, n_surfaces, PLACES + NEW_PLACES))
     turned = rng.uniform(-np.pi, np.pi, places_m.shape[1:])
     astray_m = ASTRAY_M * rng.standard_normal((2, n_surfaces, PLACES))
-    scattered = slides_at(scene, places_m, turned, rng)
-    track = slides_at(scene, astray_m, 0.0 * turned[:, :PLACES], rng)
-    there = [replace(one, place=f'at {one.number}') for one in scattered]
-    return SlideDataset((*there, *(replace(x, number=FIRST_OF_TRACK + x.number, place='track') for x in track)))
+    scattered, track = (
+        slides_at(scene, places_m, turned, rng),
+        slides_at(scene, astray_m, 0.0 * turned[:, :PLACES], rng),
+    )
+    return SlideDataset(
+        (*(replace(one, place=f'at {one.number}') for one in scattered),
+         *(replace(one, number=FIRST_OF_TRACK + one.number, place='track') for one in track))
+    )  # fmt: skip
 
 
 def _places(slides: SlideDataset) -> Trials:
     """Return six slides of one track, or of six places, trained and new places tested."""
     first = FIRST_OF_TRACK
     new = names_of(slides, f'{PLACES + 1}-{first}')
-    track, six = names_of(slides, f'{first + 1}-{first + PLACES}'), names_of(slides, f'1-{PLACES}')
-    return slides, [
-        Trial(track, {(OTHER, 'simulated, new places from one track'): new}),
-        Trial(six, {(OTHER, 'simulated, new places from six'): new}),
+    trials = [
+        Trial(
+            '',
+            names_of(slides, f'{first + 1}-{first + PLACES}'),
+            {(OTHER, 'simulated, new places from one track'): new},
+        ),
+        Trial('', names_of(slides, f'1-{PLACES}'), {(OTHER, 'simulated, new places from six'): new}),
     ]
+    return slides, trials
 
 
 def _read_track(options: BenchmarkOptions) -> SlideDataset:
@@ -359,7 +390,7 @@ def _track(halves: SlideDataset) -> Trials:
         (HALVES, row): names_of(halves, f'{number * ANCHORED + first + 1}-{(number + 1) * ANCHORED}', row)
         for number, row in enumerate(ANCHOR)
     }
-    return halves, [Trial(names_of(halves, f'1-{first}'), tested)]
+    return halves, [Trial('', names_of(halves, f'1-{first}'), tested)]
 
 
 def slides_at(scene: Scene, places_m: Any, directions_rad: Any, rng: np.random.Generator) -> SlideDataset:
@@ -397,7 +428,7 @@ def _dates(slides: SlideDataset) -> Trials:
         trained = [one for one in slides if one.session != date]
         surfaces = {one.surface for one in trained}
         left = [one.name for one in slides if one.session == date and one.surface in surfaces]
-        trials.append(Trial([one.name for one in trained], {(OTHER, 'fingersense, another date'): left}))
+        trials.append(Trial('', [one.name for one in trained], {(OTHER, 'fingersense, another date'): left}))
     return slides, trials
 
 
@@ -446,7 +477,7 @@ def _sessions(slides: SlideDataset) -> Trials:
     trained = [one.name for one in slides if one.session == SPIDER_TRAINED]
     days = [one.name for one in slides if one.session in (SPIDER_TRAINED, '2024-02-13b')]
     two = {(OTHER, f'{row}, two sessions trained'): names for (_, row), names in rows.items() if 'same day' not in row}
-    return slides, [Trial(trained, rows), Trial(days, two)]
+    return slides, [Trial('', trained, rows), Trial('', days, two)]
 
 
 def _read_borealtc(options: BenchmarkOptions) -> SlideDataset:
@@ -473,19 +504,19 @@ def _runs(slides: SlideDataset) -> Trials:
         earlier |= set(runs[: math.ceil(BOREAL_TRAINED * len(runs))])
     trained = [one.name for one in slides if one.session in earlier]
     tested = [one.name for one in slides if one.session not in earlier]
-    return slides, [Trial(trained, {(OTHER, 'borealtc, other runs'): tested})]
+    return slides, [Trial('', trained, {(OTHER, 'borealtc, other runs'): tested})]
 
 
 def _strokes(slides: SlideDataset) -> Trials:
     tested = {(OTHER, 'lmt29, other strokes by hand'): names_of(slides, '5-6')}
-    return slides, [Trial(names_of(slides, '1-4'), tested)]
+    return slides, [Trial('', names_of(slides, '1-4'), tested)]
 
 
 def _speeds(slides: SlideDataset) -> Trials:
     """Return each speed left out in turn."""
     names, speeds = slides.names, slides.condition('speed')
     trials = [
-        Trial(names[speeds != speed].tolist(), {(OTHER, 'ntp21, another speed'): names[speeds == speed].tolist()})
+        Trial('', names[speeds != speed].tolist(), {(OTHER, 'ntp21, another speed'): names[speeds == speed].tolist()})
         for speed in np.unique(speeds)
     ]
     return slides, trials
@@ -496,7 +527,7 @@ def _other_half(slides: SlideDataset) -> Trials:
     halves = slides.select(where=lambda one: one.speed_m_s < 0.05).in_parts(2)
     names, forces, places = halves.names, halves.condition('force'), halves.condition('place')
     trials = [
-        Trial(names[(forces != force) & (places == place)].tolist(),
+        Trial('', names[(forces != force) & (places == place)].tolist(),
               {(OTHER, 'ntp21, the other half'): names[(forces == force) & (places != place)].tolist()})
         for force in np.unique(forces)
         for place in ('1/2', '2/2')

@@ -5,16 +5,15 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
-from functools import partial
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_benchmarks.generalisation import END, Trial, answers_of, names_of
+from texture_benchmarks.generalisation import Answer, Trial, answers_of, figures, names_of
 from texture_benchmarks.study import (
     DATA,
     QUICK_MATERIALS,
@@ -73,17 +72,25 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     earlier, later = ('1-8', '9-12') if options.quick else (EARLIER, LATER)
     numbers: dict[str, dict[str, Any]] = {SAME: {}, PLACE: {}}
     names = QUICK if options.quick else tuple(RECIPES)
-    trials = [
-        Trial(
-            names_of(slides, earlier, place),
-            {(SAME, ''): names_of(slides, later, place), (PLACE, ''): names_of(slides, later, other)},
-        )
-        for place, other in (PLACES, PLACES[::-1])
-    ]
-    tried = map_forked(partial(answers_of, 'halves of biotac20', (slides, trials), recipe_of), names)
-    for name, found in zip(names, tried, strict=True):
-        for (shift, _), answers in found.items():
-            numbers[shift][name] = _accuracy([(one.cluster, one.surface == one.ends[END][0]) for one in answers])
+    trials = []
+    for place, other in (PLACES, PLACES[::-1]):
+        tested = {('', shift): names_of(slides, later, where) for shift, where in ((SAME, place), (PLACE, other))}
+        trials.append(Trial(place, names_of(slides, earlier, place), tested))
+
+    def tried(name: str) -> dict[str, list[Answer]]:
+        found: defaultdict[str, list[Answer]] = defaultdict(list)
+        for (_, shift, _), answers in answers_of('halves of biotac20', (slides, trials), recipe_of, name):
+            found[shift] += answers
+        return found
+
+    for name, found in zip(names, map_forked(tried, names), strict=True):
+        for shift, answers in found.items():
+            ends = figures(answers)
+            numbers[shift][name] = {
+                'slides': len(answers),
+                'right': ends['accuracy'],
+                'interval': ends['interval']['accuracy'],
+            }
     for name in (one for one in OF_TWO if one in names):
         for shift, right in _of_two(slides, earlier, later, recipe_of(name)).items():
             numbers[shift][f'{name}, two fingers'] = right
@@ -108,7 +115,14 @@ def _of_two(slides: SlideDataset, earlier: str, later: str, recipe: Recipe) -> M
             requested, true = _joined(others.features(recipe.feature_set))
             named = names[predictor(requested).argmax(axis=1)]
             right[shift] += [(f'{label} {half}', bool(label == one)) for label, one in zip(true, named, strict=True)]
-    return {shift: _accuracy(pairs) for shift, pairs in right.items()}
+    return {
+        shift: {
+            'slides': len(pairs),
+            'right': float(np.mean([one for _, one in pairs])),
+            'interval': fraction_interval([one for _, one in pairs], [cluster for cluster, _ in pairs]),
+        }
+        for shift, pairs in right.items()
+    }
 
 
 def _joined(features: LabelledFeatures) -> tuple[Array, NDArray[np.str_]]:
@@ -121,10 +135,3 @@ def _joined(features: LabelledFeatures) -> tuple[Array, NDArray[np.str_]]:
         rows += [np.concatenate((features.values[one], features.values[other])) for one, other in pairs]
         labels += [label] * len(pairs)
     return np.stack(rows), np.array(labels)
-
-
-def _accuracy(right: Sequence[tuple[str, bool]]) -> dict[str, Any]:
-    """Return the fraction that is right, of clusters and whether each slide or pair of slides is right."""
-    which = [one for _, one in right]
-    interval = fraction_interval(which, [cluster for cluster, _ in right])
-    return {'slides': len(right), 'right': float(np.mean(which)), 'interval': interval}
