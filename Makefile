@@ -61,9 +61,9 @@ benchmark: setup
 # General classifiers of time series, in packages of their own, on the slides on which the recipes are compared.
 peers: setup
 	@test -d out/peers || .venv/bin/python -m venv out/peers
-	@out/peers/bin/pip install --quiet aeon
+	@out/peers/bin/pip install --quiet aeon torch
 	@TEXTURE_PEERS=$$(out/peers/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))') \
-		.venv/bin/texture benchmark overview
+		sh -c '.venv/bin/texture benchmark overview && .venv/bin/texture benchmark generalisation'
 
 docs: setup
 	@$(RUN) python docs/build.py out/site

@@ -84,7 +84,7 @@ def test_a_control_tells_surfaces_that_were_slid_over_in_different_directions() 
     made = slides(count=8, direction_rad=[0.0, 1.5] * 4)
     names = made.names.tolist()
     trials = [Trial('', names, {('halves', 'same'): names})]
-    [(cell, answers)] = answers_of('t', (made, trials), recipe_of, 'direction alone')
+    [(cell, answers)] = answers_of('t', (made, trials), 0, recipe_of, 'direction alone')
     assert cell == ('halves', 'same', '')
     assert all(one.ends[END][0] == one.surface for one in answers)
 

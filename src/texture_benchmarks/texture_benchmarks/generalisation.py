@@ -19,6 +19,7 @@ from sklearn.discriminant_analysis import QuadraticDiscriminantAnalysis
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
+from texture_benchmarks import peers
 from texture_benchmarks.peers import SVC, recipe_of
 from texture_benchmarks.study import (
     DATA,
@@ -37,6 +38,7 @@ from texture_evaluation.charts import COLOURS, chart
 from texture_evaluation.cross_validation import predict_slides
 from texture_evaluation.metrics import TIMES_S, SlideResult
 from texture_evaluation.train import training_examples
+from texture_features.windows import WindowParams
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.slides import LabelledSlide
 from texture_simulation.offline import simulate_slides
@@ -76,9 +78,10 @@ SPIDER_HZ, SPIDER_TRAINED = 15.6, '2024-02-13'
 SPIDER = {'2024-02-13b': 'same day', '2024-02-20am1': 'other day', '2024-02-20am2': 'other day',
           '2024-02-21_sensor2': 'other specimen'}  # fmt: skip
 BOREAL_HZ, BOREAL_S, BOREAL_SLIDES, BOREAL_TRAINED = 100.0, 5.0, 12, 0.6  # slides of a run at most, and trained runs
-# For every draw.
+# For every draw; networks take ten times as long.
 QUICK_RECIPES = ('any-place-and-taxels', 'any-place', SVC, 'force and speed alone', 'direction alone')
 LONG_NS = 2_000_000_000  # slides from here on have enough windows 0.5 s apart
+PEER_WINDOWS = WindowParams(length_s=0.5, hop_s=0.25)
 
 
 class Trial(NamedTuple):
@@ -106,7 +109,7 @@ END, DECIDED = 'end', 'decided'
 Cell = tuple[str, str, str]  # table, row, draw
 Figures = tuple[str, str, str, dict[str, Any]]  # table, row, recipe, figures
 FINISHED = 'generalisation.jsonl'  # a line for each recipe on each part, as it is finished
-SLOW = ('default', 'vibration-and-taxels')  # begin first
+SLOW = ('default', 'vibration-and-taxels')  # begin first; the convolutional network last
 QUICK_SET = 'simulated track'
 
 
@@ -126,9 +129,10 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         for name in slides
         for part, (recipes, _) in chosen[name].parts.items()
         for recipe in recipes
+        if recipe != peers.CNN or peers.available(peers.CNN)
     }
-    order = sorted(parts, key=lambda name: parts[name][2] not in SLOW)
-    work = partial(_run_part, slides)
+    order = sorted(parts, key=lambda name: (parts[name][2] == peers.CNN, parts[name][2] not in SLOW))
+    work = partial(_run_part, slides, options.seed)
     found = resumed(work, {name: parts[name] for name in order}, options.out / FINISHED, options)
     numbers: dict[str, Any] = {table: {} for table in (DISTANCE, SPACING, HALVES, OTHER)}
     for table, row, recipe, cell in (one for name in parts if name in found for one in found[name]):
@@ -157,12 +161,12 @@ def _read(chosen: Mapping[str, Source], options: BenchmarkOptions) -> dict[str, 
     return {name: chosen[name].read(options) for name in there}
 
 
-def _run_part(slides: Mapping[str, SlideDataset], part: tuple[str, str, str]) -> list[Figures]:
+def _run_part(slides: Mapping[str, SlideDataset], seed: int, part: tuple[str, str, str]) -> list[Figures]:
     """Return table, row and figures of each cell of one recipe on one part."""
     source, name, recipe = part
     found: defaultdict[tuple[str, str], dict[str, list[Answer]]] = defaultdict(lambda: defaultdict(list))
     _, make = SETS[source].parts[name]
-    for (table, row, draw), answers in answers_of(name, make(slides[source]), recipe_of, recipe):
+    for (table, row, draw), answers in answers_of(name, make(slides[source]), seed, recipe_of, recipe):
         found[table, row][draw] += answers
     return [(table, row, recipe, _pooled(draws)) for (table, row), draws in found.items()]
 
@@ -185,13 +189,17 @@ Tested = Callable[[Sequence[str]], Mapping[str, tuple[Mapping[str, tuple[str, bo
 
 
 def answers_of(
-    part: str, trials: Trials, recipe_named: Callable[[str], Recipe], name: str
+    part: str, trials: Trials, seed: int, recipe_named: Callable[[str], Recipe], name: str
 ) -> list[tuple[Cell, list[Answer]]]:
     """Return what a recipe answers in each trial of a part; its features are computed once."""
     dataset, all_trials = trials
     slides = {one.name: one for one in dataset}
     if name in CONTROLS:
         fit: Callable[[Sequence[str]], Tested] = partial(_control, slides, CONTROLS[name])
+    elif name in peers.CLASSIFIERS:
+        topics = sorted(dataset[0].signals)
+        windows = {key: peers.windows_of(one, topics, PEER_WINDOWS) for key, one in slides.items()}
+        fit = partial(_peer, slides, windows, name, seed)
     else:
         long = dataset[0].sliding[-1].stamp_ns - dataset[0].sliding[0].stamp_ns > LONG_NS
         recipe = with_spaced_windows(recipe_named(name)) if name == SVC and long else recipe_named(name)
@@ -230,6 +238,17 @@ def _recipe(slides: SlideDataset, recipe: Recipe, *, accepts_all: bool) -> Calla
         }
 
     return fit
+
+
+def _peer(
+    slides: Mapping[str, LabelledSlide], windows: Mapping[str, Any], name: str, seed: int, trained: Sequence[str]
+) -> Tested:
+    """Return what a peer answers by the sum of the logarithms of its probabilities over the windows of a slide."""
+    fitted = peers.classifier(name, seed)
+    labels = np.concatenate([np.repeat(slides[one].surface, len(windows[one])) for one in trained])
+    fitted.fit(np.concatenate([windows[one] for one in trained]), labels)
+    votes = {one: np.log(fitted.predict_proba(windows[one]) + 1e-9).sum(axis=0) for one in slides}
+    return lambda names: {one: ({END: (str(fitted.classes_[votes[one].argmax()]), True)}, '') for one in names}
 
 
 def _control(
@@ -547,10 +566,10 @@ SETS: Mapping[str, Source] = {
     'biotac20': Source(
         partial(recorded, name='biotac20'),
         {
-            'cells': ((*PLACE_RECIPES, SVC), _cells),
+            'cells': ((*PLACE_RECIPES, SVC, peers.CNN), _cells),
             **{
                 ', '.join(spans): (
-                    (*PLACE_RECIPES, SVC, *(CONTROLS if 'no gap' in spans else ())),
+                    (*PLACE_RECIPES, SVC, peers.CNN, *(CONTROLS if 'no gap' in spans else ())),
                     partial(_stretches, spans, trained),
                 )
                 for trained, spans in GAPS
@@ -616,7 +635,7 @@ SPLIT = (
 # --------------------
 # The chart.
 
-DRAWN = {'any-place-and-taxels': COLOURS[0], 'default': COLOURS[1], SVC: COLOURS[3]}
+DRAWN = {'any-place-and-taxels': COLOURS[0], 'default': COLOURS[1], SVC: COLOURS[3], peers.CNN: COLOURS[5]}
 LINES = {'accuracy': '-', 'accepted_correct': '--', 'accepted_wrong': ':'}
 WORDS = {'accuracy': 'accuracy', 'accepted_correct': 'accepted and correct', 'accepted_wrong': 'accepted but wrong'}
 
@@ -645,7 +664,7 @@ def _draw_distance(axes: Any, rows: Mapping[str, Mapping[str, Any]]) -> None:
             continue
         axes.plot([], [], color=colour, label=name)
         for what, dashes in LINES.items():
-            if what == 'accuracy' or name != SVC:
+            if what == 'accuracy' or name not in (SVC, peers.CNN):
                 axes.plot(at_cm, [100 * cell[what] for cell in cells], dashes, color=colour, marker='.')
     for what, dashes in LINES.items():
         axes.plot([], [], dashes, color='black', label=WORDS[what])

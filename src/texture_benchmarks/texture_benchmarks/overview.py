@@ -17,7 +17,7 @@ import numpy as np
 from matplotlib.transforms import Bbox
 
 from texture_benchmarks import peers
-from texture_benchmarks.peers import MINIROCKET, QUANT, SVC, recipe_of, right_over_time, windows_of
+from texture_benchmarks.peers import CNN, MINIROCKET, QUANT, SVC, recipe_of, right_over_time, windows_of
 from texture_benchmarks.study import (
     DATA,
     QUICK_MATERIALS,
@@ -54,7 +54,9 @@ JOBS = (
     _Job(VIBRATION, PAPERS, 'hu-pca-svm'),
     _Job(VIBRATION, PEERS, MINIROCKET),
     _Job(VIBRATION, PEERS, QUANT),
+    _Job(VIBRATION, PEERS, CNN),
     _Job(ALL_CHANNELS, PEERS, MINIROCKET),
+    _Job(ALL_CHANNELS, PEERS, CNN),
     _Job(VIBRATION, PAPERS, 'ets-fine-svm'),
     _Job(VIBRATION, PAPERS, 'ets-linear-svm'),
     _Job(VIBRATION, PAPERS, 'jamali-naive-bayes-5'),
@@ -117,7 +119,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
 def jobs_of(quick: bool) -> list[_Job]:
     """Return what is tried: some recipes alone for a reduced run, and peers only where their package is."""
     chosen = [job for job in JOBS if not quick or job.name in QUICK_RECIPES]
-    return [job for job in chosen if job.name not in peers.CLASSIFIERS or peers.available()]
+    return [job for job in chosen if job.name not in peers.CLASSIFIERS or peers.available(job.name)]
 
 
 def _try(dataset: SlideDataset, splitter: ChronologicalSplit, seed: int, job: _Job) -> _Tried:

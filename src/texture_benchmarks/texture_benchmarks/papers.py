@@ -79,7 +79,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
 
     def tried(name: str) -> dict[str, list[Answer]]:
         found: defaultdict[str, list[Answer]] = defaultdict(list)
-        for (_, shift, _), answers in answers_of('halves of biotac20', (slides, trials), recipe_of, name):
+        for (_, shift, _), answers in answers_of('halves of biotac20', (slides, trials), options.seed, recipe_of, name):
             found[shift] += answers
         return found
 
