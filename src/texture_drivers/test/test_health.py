@@ -327,5 +327,5 @@ def test_what_was_lost_at_a_restart_is_named_unknown() -> None:
     sensor, reader, _ = run('', 3)
     health = SensorHealth(reader, 0.0)
     assert 'lost at restarts' not in health.report(1.0)[2]
-    sensor.counts['restarts'] = 1
+    sensor.counts['device restarts'] = 1
     assert 'unknown' in health.report(2.0)[2]['lost at restarts']

@@ -91,6 +91,18 @@ def test_sequence_and_time_wrap_without_a_trace():
     np.testing.assert_allclose(steps_ns, 4e6, rtol=0.02)
 
 
+def test_what_is_less_than_a_sample_adds_up_over_many_interruptions():
+    line, at_s = StreamDecoder([stream(rate_hz=100.0, channels=('a',))]), 0.0
+    for _ in range(101):
+        line.restart()
+        for number in range(20):
+            sent = pack(frame(number, rows=1, rate_hz=100.0, columns=1))
+            line.feed(sent, START + round((at_s + number / 100) * SECOND))
+        at_s += 0.303  # the clock settles for 0.1 s, in which samples are not numbered; 0.3 of one are lost in addition
+    lost = line.trackers[1].lost + line.trackers[1].samples
+    assert lost == pytest.approx((at_s - 0.303 + 0.1) * 100, abs=1.5)
+
+
 def test_two_streams_of_one_line_share_its_clock_and_lose_independently():
     fast, slow = stream(), stream(kind=2, rate_hz=50.0, channels=('f',), topic='signal_static')
     line = StreamDecoder([fast, slow])

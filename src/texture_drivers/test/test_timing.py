@@ -15,7 +15,6 @@ from texture_drivers.timing import (
     ArrivalNumbering,
     BlockCounter,
     Decimator,
-    PacketNumbering,
     RateMeter,
     SampleCounter,
     StreamClock,
@@ -337,15 +336,6 @@ def test_the_stamps_themselves_show_how_many_ticks_a_sample_takes(ticks: int, ji
         indices, waiting = indices + placed, waiting[len(placed) :]
     assert indices == numbers
     assert (counter.lost, counter.damaged_stamps) == (7, 0)
-
-
-def test_what_is_less_than_a_packet_adds_up_over_many_interruptions() -> None:
-    numbering, start_ns = PacketNumbering(100.0), 0
-    for _ in range(101):
-        numbering.interrupt()
-        numbering.place(0, 5, start_ns)
-        start_ns += 53 * SECOND // 1000  # five packets, and three tenths of one that is lost
-    assert numbering.lost == pytest.approx(30, abs=1)
 
 
 def test_a_device_that_samples_a_trifle_too_fast_loses_nothing() -> None:

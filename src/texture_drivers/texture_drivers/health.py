@@ -309,7 +309,7 @@ HealthReport = tuple[str, str, Mapping[str, Any]]
 # A restarted driver numbers from 0: what its stream lost before is unknown, above all at high rates.
 BEFORE_THE_START = {'lost before the start': 'unknown'}
 # A restarted bridge also numbers from 0: what was lost in between is estimated by time, to about a packet.
-INTERRUPTIONS = ('restarts', 'reopened')
+INTERRUPTIONS = ('device restarts', 'reopened')
 AT_INTERRUPTIONS = {'lost at restarts': 'estimated by time; less than a packet is unknown'}
 
 

@@ -352,46 +352,6 @@ class SampleCounter:
 
 
 # --------------------
-# Give packets that carry their number its running index.
-
-
-class PacketNumbering:
-    """Give each packet its index: a jump is what was lost, over an interruption by the time that passed.
-
-    A stream that begins again need not begin on the beat of packets: what is less than a packet is carried on to the
-    next interruption, so that many of them do not add up to an uncounted loss.
-    """
-
-    def __init__(self, rate_hz: float) -> None:
-        self.lost = 0
-        self._rate_hz = rate_hz
-        self._next_index = 0
-        self._next_ns: int | None = None  # when the next packet should start
-        self._next_number: int | None = None  # none after an interruption
-        self._carried = 0.0  # packets lost in interruptions and not counted yet; below 0: counted too many
-
-    def interrupt(self) -> None:
-        """Forget the device's numbers: they begin again."""
-        self._next_number = None
-
-    def place(self, number: int, count: int, start_ns: int) -> int:
-        """Return the index of the first of `count` packets that follow each other."""
-        skipped = 0
-        if self._next_number is not None:
-            skipped = number - self._next_number
-        elif self._next_ns is not None:
-            missing = self._carried + max(0.0, (start_ns - self._next_ns) / NANOSECONDS * self._rate_hz)
-            skipped = round(missing)
-            self._carried = missing - skipped
-        self.lost += skipped
-        index = self._next_index + skipped
-        self._next_index = index + count
-        self._next_number = number + count
-        self._next_ns = start_ns + round(count / self._rate_hz * NANOSECONDS)
-        return index
-
-
-# --------------------
 # Give blocks of samples their running index, so that a jump of the index is exactly what was lost.
 
 RATE_CHECK_S = 1.0

@@ -81,8 +81,7 @@ def test_the_serial_number_is_reported_and_a_silent_bridge_is_an_error_with_advi
 def test_all_fingers_of_a_board_have_separate_topics(open_rig: Make) -> None:
     rig = board(open_rig, serials=('BT-0', 'BT-1', ''), prefix='finger1/', fingers=(0, 1, 2))
     topics = rig.read_s(0.1)
-    assert not topics['finger2/signal']
-    assert set(topics) == {f'finger{n}/{topic}' for n in range(3) for topic in ('signal', 'signal_static')}
+    assert set(topics) == {f'finger{n}/{topic}' for n in range(2) for topic in ('signal', 'signal_static')}
 
 
 def test_a_rate_that_nobody_set_is_measured_and_kept(open_rig: Make) -> None:
