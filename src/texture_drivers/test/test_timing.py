@@ -220,7 +220,7 @@ def test_after_lost_packets_the_times_are_right_again_within_a_second(n, drift):
     finger, errors = follow(20.0, losing(20.0, (8.0, n)), drift=drift)
     calm = (errors[:, 0] > 3.0) & ((errors[:, 0] < 8.0) | (errors[:, 0] > 8.0 + n / 1000 + CALM_S))
     assert np.abs(errors[calm, 1]).max() < BOUND_S
-    assert finger.cutter.lost == pytest.approx(n, abs=10)
+    assert finger.lost == pytest.approx(n, abs=10)
 
 
 def test_one_packet_in_twenty_lost_at_random_stays_within_the_bound():
@@ -232,13 +232,13 @@ def test_one_packet_in_twenty_lost_at_random_stays_within_the_bound():
 @pytest.mark.parametrize('late_ms', [0.0, 50.0])
 def test_a_busy_host_loses_nothing(late_ms):
     finger, errors = follow(10.0, losing(10.0), late_ms=late_ms)
-    assert finger.cutter.lost == 0
+    assert finger.lost == 0
     assert np.abs(errors[:, 1]).max() < BOUND_S
 
 
 def test_where_there_are_stamps_they_alone_count():
     finger, errors = follow(10.0, losing(10.0, (5.0, 100)), stamped=True)
-    assert finger.cutter.lost == 100
+    assert finger.lost == 100
     assert np.abs(errors[errors[:, 0] > 1.0, 1]).max() < 2e-3
 
 
