@@ -68,13 +68,13 @@ def bitwise_crc(data: bytes) -> int:
     return register
 
 
-IMAGE = np.arange(28, dtype=np.uint16) + 0x1000
+IMAGE = np.arange(28, dtype=np.uint16)[:, None] + 0x1000
 IMAGE_HEX = ''.join(f'10{i:02X}' for i in range(28))
 STILL = '0000 0000 4000', '0000 0000 0000'
 
 
 def test_a_millisecond_of_both_fingers_with_a_long_stamp() -> None:
-    came = b''.join(Tsf85Encoder().packets(0x0102, np.array([-2], dtype=np.int16), IMAGE, image_is_new=False))
+    came = b''.join(Tsf85Encoder().packets(0x0102, np.array([[-2]], dtype=np.int16), IMAGE, image_is_new=False))
     expected = (
         f'9A 00 58 2B 70 0000000000000102 20 FFFE 30 {STILL[0]} 40 {STILL[1]} 24 0000 34 {STILL[0]} 44 {STILL[1]}'
     )
@@ -83,7 +83,7 @@ def test_a_millisecond_of_both_fingers_with_a_long_stamp() -> None:
 
 def test_the_second_finger_with_a_short_stamp_that_wraps() -> None:
     encoder = Tsf85Encoder(finger=1, long_stamps=False)
-    came = b''.join(encoder.packets(0xFFFF, np.array([258, 259], dtype=np.int16), IMAGE, image_is_new=False))
+    came = b''.join(encoder.packets(0xFFFF, np.array([[258], [259]], dtype=np.int16), IMAGE, image_is_new=False))
     rest = f'20 0000 30 {STILL[0]} 40 {STILL[1]}'
     image = f'9A 00 58 39 14 {IMAGE_HEX}'
     first = f'9A 00 58 25 70 FFFF {rest} 24 0102 34 {STILL[0]} 44 {STILL[1]}'
@@ -93,6 +93,6 @@ def test_the_second_finger_with_a_short_stamp_that_wraps() -> None:
 
 def test_new_firmware_sends_an_image_once() -> None:
     encoder = Tsf85Encoder()
-    came = b''.join(encoder.packets(0, np.zeros(3, dtype=np.int16), IMAGE, image_is_new=True))
+    came = b''.join(encoder.packets(0, np.zeros((3, 1), dtype=np.int16), IMAGE, image_is_new=True))
     assert came.startswith(bytes.fromhex(f'9A 00 58 39 10 {IMAGE_HEX} 9A'))
     assert came.count(bytes.fromhex(IMAGE_HEX)) == 1
