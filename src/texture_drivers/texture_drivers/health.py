@@ -111,13 +111,7 @@ Flags = NDArray[np.bool_]
 class TareParams:
     """How the level without load is measured and used."""
 
-    tare_s: float = param(
-        1.0,
-        "Averaging time of the service '~/tare'.",
-        unit='s',
-        low=0.1,
-        high=60.0,
-    )
+    tare_s: float = param(1.0, "Averaging time of the service '~/tare'.", unit='s', low=0.1, high=60.0)
     subtract_baseline: bool = param(
         False,
         'Subtracts the baseline from the published samples once the sensor has been tared; a model needs the setting '

@@ -50,11 +50,7 @@ class PvdfSettings:
 
     baud: int = baud_param(BAUD)
     film_gain_pc: float = param(FILM_PC_PER_COUNT, 'Charge of one count of the film.', unit='pC')
-    force_gain_n: float = param(
-        FORCE_N_PER_COUNT,
-        'Force of one count of the force sensor.',
-        unit='N',
-    )
+    force_gain_n: float = param(FORCE_N_PER_COUNT, 'Force of one count of the force sensor.', unit='N')
 
     def streams(self) -> list[FramedStream]:
         """Return what the device sends, as the line understands it."""

@@ -24,8 +24,7 @@ class BatchParams:
     """How the samples of a finger are delivered."""
 
     frame_id: str = param(
-        'fingertip',
-        'Frame of the fingertip in the published messages; in a namespace NAMESPACE/ is put before it.',
+        'fingertip', 'Frame of the fingertip in the published messages; in a namespace NAMESPACE/ is put before it.'
     )
     batch_s: float = param(
         0.01,
@@ -47,8 +46,7 @@ class SensorParams(BatchParams):
         "Path of the device; a symbolic link is followed at each opening. 'auto' finds the only TSF-85 on USB.",
     )
     config: str = param(
-        '',
-        "Settings of the sensor: path of a YAML file or name of one in config/sensors; '' takes the defaults.",
+        '', "Settings of the sensor: path of a YAML file or name of one in config/sensors; '' takes the defaults."
     )
 
 

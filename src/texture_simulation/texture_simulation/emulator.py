@@ -127,9 +127,7 @@ class EmulatorParams:
     surface: str = param('glass', 'Surface under the finger; setting it at run time swaps the sample.')
     seed: int = param(0, 'Seed of all randomness; equal seeds give equal signals.', low=0)
     sensor: str = param(
-        '',
-        "Emulated sensor, which appears at `sensor_link`; '' takes that of the scene.",
-        choices=('', *LIVE_SENSORS),
+        '', "Emulated sensor, which appears at `sensor_link`; '' takes that of the scene.", choices=('', *LIVE_SENSORS)
     )
     sensor_link: str = param(
         f'{DEVICES}/sensor',
@@ -137,10 +135,7 @@ class EmulatorParams:
     )
     plugged: bool = param(True, 'Plugs the emulated sensor in; setting it to false at run time unplugs it.')
     unplugged_finger: int = param(
-        -1,
-        'Finger of a TSF-85 whose plug is out of the hub, which may be set at run time; -1 is none.',
-        low=-1,
-        high=1,
+        -1, 'Finger of a TSF-85 whose plug is out of the hub, which may be set at run time; -1 is none.', low=-1, high=1
     )
     bit_flips: float = param(
         0.0,

@@ -37,11 +37,7 @@ class Stribeck:
     )
     kinetic: float = param(0.5, 'Coefficient of kinetic friction of fast sliding.', low=1e-3, high=5.0)
     stribeck_m_s: float = param(
-        0.05,
-        'Stribeck speed over which friction falls from static to kinetic.',
-        unit='m/s',
-        low=1e-4,
-        high=10.0,
+        0.05, 'Stribeck speed over which friction falls from static to kinetic.', unit='m/s', low=1e-4, high=10.0
     )
     viscous_s_m: float = param(0.0, 'Growth of the coefficient of friction per speed.', unit='s/m', low=0.0, high=100.0)
     FORCE_COUPLING: ClassVar[float] = 0.2  # measured force per tangential force on the skin
