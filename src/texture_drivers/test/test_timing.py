@@ -348,12 +348,6 @@ def test_a_device_that_samples_a_trifle_too_fast_loses_nothing() -> None:
 BLOCKS_HZ = 2500.0  # 10 samples take 4000 µs
 
 
-def test_a_lost_frame_moves_the_index_by_exactly_its_samples():
-    counter = BlockCounter(BLOCKS_HZ, 'daq')
-    assert [counter.place(0, 10, 0), counter.place(12_000, 10, 2), counter.place(16_000, 10, 0)] == [0, 30, 40]
-    assert counter.overrun == 0
-
-
 def test_samples_that_the_device_left_out_are_reported_separately_from_lost_frames():
     counter = BlockCounter(BLOCKS_HZ, 'daq')
     assert [counter.place(0, 10, 0), counter.place(4000 + 5 * 400, 10, 0)] == [0, 15]
@@ -380,10 +374,3 @@ def test_one_hiccup_of_the_device_is_no_wrong_rate():
     for i in range(2000):
         counter.place(4000 * i + (200_000 if i > 500 else 0), 10, 0)
     assert counter.overrun == 500
-
-
-def test_after_an_interruption_the_index_goes_on_where_it_is_reported_to():
-    counter = BlockCounter(BLOCKS_HZ, 'daq')
-    counter.place(5_000_000, 10, 0)
-    counter.resume(missing=90)
-    assert counter.place(17, 10, 0) == 100

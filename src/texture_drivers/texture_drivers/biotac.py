@@ -19,7 +19,7 @@ from texture_core.framing import Frame, pack
 from texture_core.types import NANOSECONDS, TactileSignal
 from texture_drivers.health import Limits
 from texture_drivers.sensor import SensorParams
-from texture_drivers.serial_line import VERSION, FramedStream, Port, SerialSensor, StreamDecoder
+from texture_drivers.serial_line import VERSION, FramedSensor, FramedStream, Port
 
 # --------------------
 # Numbers of the BioTac's protocol and streams.
@@ -321,131 +321,7 @@ BRIDGE_DRIFT = 5e-3  # the internal oscillator of a microcontroller on USB is ri
 CHEETAH_DRIFT = 2e-2  # the slots are made of delays, whose sum is nominal
 
 
-class BioTacDecoder(StreamDecoder):
-    """Decode the frames of a board, of each of which the slow channels are one sample; see `StreamDecoder`."""
-
-    def __init__(self, params: SensorParams, layout: BioTacLayout, prefixes: Mapping[int, str]) -> None:
-        slow = FramedStream(
-            topic='signal_static',
-            kind=REPLY,
-            sensor=SLOW_SENSOR,
-            rate_hz=layout.frame_rate_hz,
-            channels=layout.slow_channels,
-            units=(UNIT,) * len(layout.slow_channels),
-            gains=np.ones(len(layout.slow_channels)),
-            offsets=np.zeros(len(layout.slow_channels)),
-            sample_s=layout.frame_s,
-        )
-        max_drift = CHEETAH_DRIFT if params.device == CHEETAH else BRIDGE_DRIFT
-        super().__init__([slow], params.frame_id, max_drift=max_drift)
-        self._device = params.device
-        self._layout = layout
-        self._prefixes = prefixes
-        self._places = 0  # of the board; 0 until its first frame
-        self._damaged = self._refused = self._answered = 0
-        self.unanswered = 0  # frames since the last one in which a requested finger answered
-        self.serials: tuple[str, ...] = ()  # of the BioTac at each place, '' where there is none
-
-    @property
-    def valid_frames(self) -> int:
-        """Frames in which a requested finger answered."""
-        return self._answered
-
-    @property
-    def counts(self) -> Mapping[str, int]:
-        """Totals; 'samples' and 'lost' are of PAC of one finger, 'damaged_words' and 'refused_words' of all read."""
-        counts, per_frame = super().counts, self._layout.pac_per_frame
-        return {
-            **counts,
-            'samples': counts['samples'] * per_frame,
-            'lost': counts['lost'] * per_frame,
-            'damaged_words': self._damaged,
-            'refused_words': self._refused,
-        }
-
-    @property
-    def rates_hz(self) -> Mapping[str, float]:
-        """Nominal rate of each topic."""
-        rates = {'signal': self._layout.pac_rate_hz, 'signal_static': self._layout.frame_rate_hz}
-        return {f'{prefix}{topic}': rate for prefix in self._prefixes.values() for topic, rate in rates.items()}
-
-    @property
-    def limits(self) -> Limits:
-        """Ends of the 12 bits by topic."""
-        return dict.fromkeys(self.rates_hz, (0, FULL_SCALE))
-
-    def restart(self) -> None:
-        """Resume after an interruption, with the index according to the host's clock."""
-        self.unanswered = self._places = 0
-        super().restart()
-
-    def _rows(self, frame: Frame) -> int:
-        if frame.kind == SERIALS:
-            self.serials = tuple(frame.body.decode('ascii', 'replace').split(','))
-            return 0
-        return super()._rows(frame)
-
-    def _rows_of(self, stream: FramedStream, frame: Frame) -> int:
-        if not frame.columns or frame.columns != (self._places or frame.columns):
-            return 0
-        if len(frame.body) != frame.rows * (ECHO_BYTES + WORD_BYTES * frame.columns):
-            return 0
-        if frame.rows != len(self._layout.slots):
-            raise DeviceError(
-                f"the bridge on '{self._device}' samples frames of {frame.rows} slots, and this kind of BioTac has "
-                f'{len(self._layout.slots)}; choose the sensor with the right one, or change the bridge'
-            )
-        missing = [finger for finger in self._prefixes if finger >= frame.columns]
-        if missing:
-            raise DeviceError(
-                f"finger {missing[0]} is requested, and the board at '{self._device}' has places 0 to "
-                f'{frame.columns - 1}; set the parameter finger to one of them'
-            )
-        self._places = frame.columns
-        return 1
-
-    def _batches(
-        self, stream: FramedStream, index: int, stamp_ns: int, data: bytes
-    ) -> Iterable[tuple[str, TactileSignal]]:
-        """Return the batches of PAC and of the slow channels of each finger that answered."""
-        replies = decode(data, self._layout, self._places)
-        frames = len(replies.slow)
-        self.unanswered += frames
-        for finger, prefix in self._prefixes.items():
-            self._damaged += int(replies.damaged[finger])
-            self._refused += int(replies.refused[finger])
-            if replies.damaged[finger] == frames * len(self._layout.slots):
-                continue  # no answer
-            self._answered, self.unanswered = self._answered + frames, 0
-            yield (
-                f'{prefix}signal',
-                TactileSignal(
-                    stamp_ns=stamp_ns + round(SLOT_NS),
-                    sensor=PAC_SENSOR,
-                    channels=(PAC,),
-                    units=(UNIT,),
-                    sampling_rate_hz=self._layout.pac_rate_hz,
-                    first_sample=index * self._layout.pac_per_frame,
-                    samples=replies.pac[:, finger : finger + 1],
-                    frame_id=self._frame_id,
-                ),
-            )
-            yield (
-                f'{prefix}signal_static',
-                TactileSignal(
-                    stamp_ns=stamp_ns,
-                    sensor=stream.sensor,
-                    channels=stream.channels,
-                    units=stream.units,
-                    sampling_rate_hz=stream.rate_hz,
-                    first_sample=index,
-                    samples=replies.slow[:, :, finger],
-                    frame_id=self._frame_id,
-                ),
-            )
-
-
-class BioTac(SerialSensor):
+class BioTac(FramedSensor):
     """Read BioTacs of one board: 'signal' is PAC at 2200 Hz, 'signal_static' all else at 100 Hz, in counts.
 
     The stamp of a PAC batch is the time of its first sample, one slot (227 µs) after the start of the frame; that of
@@ -474,28 +350,140 @@ class BioTac(SerialSensor):
         layout: BioTacLayout = LAYOUTS['biotac'],
         fingers: Sequence[int] = (),
     ) -> None:
+        slow = FramedStream(  # its samples are whole frames
+            topic='signal_static',
+            kind=REPLY,
+            sensor=SLOW_SENSOR,
+            rate_hz=layout.frame_rate_hz,
+            channels=layout.slow_channels,
+            units=(UNIT,) * len(layout.slow_channels),
+            gains=np.ones(len(layout.slow_channels)),
+            offsets=np.zeros(len(layout.slow_channels)),
+            sample_s=layout.frame_s,
+        )
+        max_drift = CHEETAH_DRIFT if params.device == CHEETAH else BRIDGE_DRIFT
+        super().__init__(params, now_ns, [slow], max_drift=max_drift)
         self._layout = layout
-        self._fingers = fingers or (params.finger,)
-        prefixes = {finger: f'finger{finger}/' for finger in fingers} or {params.finger: ''}
-        self._board = BioTacDecoder(params, layout, prefixes)
-        super().__init__(params, now_ns, self._board)
+        self._prefixes = {finger: f'finger{finger}/' for finger in fingers} or {params.finger: ''}
+        self._places = 0  # of the board; 0 until its first frame
+        self._damaged = self._refused = self._answered = 0
+        self._unanswered = 0  # frames since the last one in which a requested finger answered
+        self._serials: tuple[str, ...] = ()  # of the BioTac at each place, '' where there is none
+
+    @property
+    def valid_frames(self) -> int:
+        """Frames in which a requested finger answered."""
+        return self._answered
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Totals; 'samples' and 'lost' are of PAC of one finger, 'damaged_words' and 'refused_words' of all read."""
+        counts, per_frame = super().counts, self._layout.pac_per_frame
+        return {
+            **counts,
+            'samples': counts['samples'] * per_frame,
+            'lost': counts['lost'] * per_frame,
+            'damaged_words': self._damaged,
+            'refused_words': self._refused,
+        }
+
+    @property
+    def expected_rates_hz(self) -> Mapping[str, float]:
+        """Nominal rate of each topic."""
+        rates = {'signal': self._layout.pac_rate_hz, 'signal_static': self._layout.frame_rate_hz}
+        return {f'{prefix}{topic}': rate for prefix in self._prefixes.values() for topic, rate in rates.items()}
+
+    @property
+    def limits(self) -> Limits:
+        """Ends of the 12 bits by topic."""
+        return dict.fromkeys(self.expected_rates_hz, (0, FULL_SCALE))
+
+    def restart(self) -> None:
+        """Resume after an interruption, with the index according to the host's clock."""
+        self._unanswered = self._places = 0
+        super().restart()
+
+    def _rows(self, frame: Frame) -> int:
+        if frame.kind == SERIALS:
+            self._serials = tuple(frame.body.decode('ascii', 'replace').split(','))
+            return 0
+        return super()._rows(frame)
+
+    def _rows_of(self, stream: FramedStream, frame: Frame) -> int:
+        if not frame.columns or frame.columns != (self._places or frame.columns):
+            return 0
+        if len(frame.body) != frame.rows * (ECHO_BYTES + WORD_BYTES * frame.columns):
+            return 0
+        if frame.rows != len(self._layout.slots):
+            raise DeviceError(
+                f"the bridge on '{self._params.device}' samples frames of {frame.rows} slots, and this kind of BioTac "
+                f'has {len(self._layout.slots)}; choose the sensor with the right one, or change the bridge'
+            )
+        missing = [finger for finger in self._prefixes if finger >= frame.columns]
+        if missing:
+            raise DeviceError(
+                f"finger {missing[0]} is requested, and the board at '{self._params.device}' has places 0 to "
+                f'{frame.columns - 1}; set the parameter finger to one of them'
+            )
+        self._places = frame.columns
+        return 1
+
+    def _batches(
+        self, stream: FramedStream, index: int, stamp_ns: int, data: bytes
+    ) -> Iterable[tuple[str, TactileSignal]]:
+        """Return the batches of PAC and of the slow channels of each finger that answered."""
+        replies = decode(data, self._layout, self._places)
+        frames = len(replies.slow)
+        self._unanswered += frames
+        for finger, prefix in self._prefixes.items():
+            self._damaged += int(replies.damaged[finger])
+            self._refused += int(replies.refused[finger])
+            if replies.damaged[finger] == frames * len(self._layout.slots):
+                continue  # no answer
+            self._answered, self._unanswered = self._answered + frames, 0
+            yield (
+                f'{prefix}signal',
+                TactileSignal(
+                    stamp_ns=stamp_ns + round(SLOT_NS),
+                    sensor=PAC_SENSOR,
+                    channels=(PAC,),
+                    units=(UNIT,),
+                    sampling_rate_hz=self._layout.pac_rate_hz,
+                    first_sample=index * self._layout.pac_per_frame,
+                    samples=replies.pac[:, finger : finger + 1],
+                    frame_id=self._params.frame_id,
+                ),
+            )
+            yield (
+                f'{prefix}signal_static',
+                TactileSignal(
+                    stamp_ns=stamp_ns,
+                    sensor=stream.sensor,
+                    channels=stream.channels,
+                    units=stream.units,
+                    sampling_rate_hz=stream.rate_hz,
+                    first_sample=index,
+                    samples=replies.slow[:, :, finger],
+                    frame_id=self._params.frame_id,
+                ),
+            )
 
     @property
     def details(self) -> Mapping[str, str | float]:
         """Serial number of each BioTac that reported it, and how much the device's clock is slow."""
-        serials = {f'serial of finger {place}': serial for place, serial in enumerate(self._board.serials) if serial}
+        serials = {f'serial of finger {place}': serial for place, serial in enumerate(self._serials) if serial}
         return {**serials, **super().details}
 
     def _open_port(self) -> Port:
         return Cheetah(self._layout) if self._params.device == CHEETAH else super()._open_port()
 
     def _silence_sentence(self) -> str:
-        if not self._board.unanswered:
+        if not self._unanswered:
             return (
                 f"device '{self._params.device}' is open but sends no complete frames; check that it is a BioTac "
                 'bridge and runs, or replug it'
             )
-        places = ' or '.join(str(finger) for finger in self._fingers)
+        places = ' or '.join(str(finger) for finger in self._prefixes)
         return (
             f"no BioTac answers as finger {places} at '{self._params.device}'; check its plug, and the parameter finger"
         )

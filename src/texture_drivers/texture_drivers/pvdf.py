@@ -12,7 +12,7 @@ import numpy as np
 
 from texture_core.config import param
 from texture_drivers.sensor import SensorParams, load_settings
-from texture_drivers.serial_line import FramedStream, SerialSensor, StreamDecoder, baud_param
+from texture_drivers.serial_line import FramedSensor, FramedStream, baud_param
 
 # --------------------
 # Numbers of the PVDF finger and of the line to its microcontroller.
@@ -78,7 +78,7 @@ class PvdfSettings:
         ]
 
 
-def pvdf(params: SensorParams, now_ns: Callable[[], int] = time.time_ns) -> SerialSensor:
+def pvdf(params: SensorParams, now_ns: Callable[[], int] = time.time_ns) -> FramedSensor:
     """Return the sensor; `params.config` means `PvdfSettings`.
 
     Raises
@@ -87,4 +87,4 @@ def pvdf(params: SensorParams, now_ns: Callable[[], int] = time.time_ns) -> Seri
         If the settings are wrong.
     """
     settings = load_settings(PvdfSettings, params.config)
-    return SerialSensor(params, now_ns, StreamDecoder(settings.streams(), params.frame_id), baud=settings.baud)
+    return FramedSensor(params, now_ns, settings.streams(), baud=settings.baud)

@@ -152,56 +152,18 @@ def reason_of(error: Exception) -> str:
 
 
 # --------------------
-# A sensor that streams samples over a serial port, whatever its protocol: a decoder turns the bytes into batches.
+# A sensor that streams samples over a serial port, whatever its protocol.
 
 SILENCE_S = 1.0  # the device sends unrequested; opening the port again often restarts it
 
 
-class Decoder:
-    """Turns the bytes of one protocol into batches; independent of port and clock."""
-
-    @property
-    def valid_frames(self) -> int:
-        """How many valid frames have come in all."""
-        raise NotImplementedError
-
-    @property
-    def counts(self) -> Mapping[str, int]:
-        """Running totals, 'samples', 'lost' and 'bogus' among them."""
-        raise NotImplementedError
-
-    @property
-    def details(self) -> Mapping[str, float]:
-        """What the device's stream shows in addition to the samples, by name."""
-        raise NotImplementedError
-
-    @property
-    def rates_hz(self) -> Mapping[str, float]:
-        """Nominal rate of each topic."""
-        raise NotImplementedError
-
-    @property
-    def limits(self) -> Limits:
-        """Lowest and highest sample by topic, where they are known."""
-        return {}
-
-    def restart(self) -> None:
-        """Resume after an interruption."""
-        raise NotImplementedError
-
-    def feed(self, data: bytes, arrival_ns: int) -> Mapping[str, Sequence[TactileSignal]]:
-        """Return the batches, by topic, in `data`, which has just arrived."""
-        raise NotImplementedError
-
-
 class SerialSensor:
-    """Read the streams of one device. See `texture_core.types.Sensor`."""
+    """Read the streams of one device. See `texture_core.types.Sensor`; each kind turns the bytes into batches."""
 
     def __init__(
         self,
         params: SensorParams,
         now_ns: Callable[[], int],
-        decoder: Decoder,
         *,
         baud: int = 115200,
         start_command: bytes = b'',
@@ -209,7 +171,6 @@ class SerialSensor:
     ) -> None:
         self._params = params
         self._now_ns = now_ns
-        self._decoder = decoder
         self._baud = baud
         self._start_command = start_command
         self._stop_command = stop_command
@@ -225,7 +186,7 @@ class SerialSensor:
         self.send(self._start_command)
         self._opened += 1
         self._silent_s, self._babbles = 0.0, False
-        self._decoder.restart()
+        self.restart()
 
     def _open_port(self) -> Port:
         return SerialPort(self._path, self._baud)
@@ -240,9 +201,9 @@ class SerialSensor:
         """Wait for the length of one batch and return what arrived."""
         data = self._opened_port().read(self._params.batch_s)
         arrival_ns = self._now_ns()
-        frames = self._decoder.valid_frames
-        batches = self._decoder.feed(data, arrival_ns)
-        alive = self._decoder.valid_frames > frames
+        frames = self.valid_frames
+        batches = self.feed(data, arrival_ns)
+        alive = self.valid_frames > frames
         self._silent_s = 0.0 if alive else self._silent_s + self._params.batch_s
         self._babbles = not alive and (self._babbles or bool(data))  # since the last valid frame, not in the last read
         self._act_on_silence()
@@ -258,24 +219,37 @@ class SerialSensor:
         self._port = None
 
     @property
+    def valid_frames(self) -> int:
+        """How many valid frames have come in all."""
+        raise NotImplementedError
+
+    def restart(self) -> None:
+        """Resume after an interruption, with the index according to the host's clock."""
+        raise NotImplementedError
+
+    def feed(self, data: bytes, arrival_ns: int) -> Mapping[str, Sequence[TactileSignal]]:
+        """Return the batches, by topic, in `data`, which has just arrived; none in the first 0.1 s of a stream."""
+        raise NotImplementedError
+
+    @property
     def counts(self) -> Mapping[str, int]:
-        """Totals of the decoder, and how often the device was opened again."""
-        return {**self._decoder.counts, 'reopened': max(0, self._opened - 1)}
+        """How often the device was opened again; each kind adds its totals, such as 'samples', 'lost', 'bogus'."""
+        return {'reopened': max(0, self._opened - 1)}
 
     @property
     def details(self) -> Mapping[str, str | float]:
-        """What the decoder reports in addition to the samples, such as the drift of the device's clock."""
-        return self._decoder.details
+        """What the stream shows in addition to the samples, such as the drift of the device's clock."""
+        return {}
 
     @property
     def expected_rates_hz(self) -> Mapping[str, float]:
         """Nominal rate of each topic."""
-        return self._decoder.rates_hz
+        raise NotImplementedError
 
     @property
     def limits(self) -> Limits:
         """Lowest and highest sample by topic, where they are known."""
-        return self._decoder.limits
+        return {}
 
     def _opened_port(self) -> Port:
         if self._port is None:
@@ -359,7 +333,7 @@ class StreamTracker:
 
 
 # --------------------
-# Streams of samples on a framed serial line: numbered, timed, in physical units. Independent of the port.
+# Streams of samples on a framed serial line: numbered, timed, in physical units.
 #
 # Each frame (see `texture_core.framing`) carries `rows` consecutive samples of `columns` channels as int16, little
 # endian, row after row; its kind identifies the stream, its time is that of the first row.
@@ -367,20 +341,28 @@ class StreamTracker:
 LONGEST_STEP_US = 10 * MICROSECONDS  # a clock that jumps further is another one; the host's clock gives the gap
 
 
-class StreamDecoder(Decoder):
-    """Decode the bytes of a framed serial line into the batches of its streams, by topic.
+class FramedSensor(SerialSensor):
+    """Read the streams of a framed serial line, all timed by one clock.
 
-    Frames of other kinds are passed over, so that other traffic may share the line. All streams are timed by one clock.
+    Frames of other kinds are passed over, so that other traffic may share the line.
     """
 
-    def __init__(self, streams: Sequence[FramedStream], frame_id: str = '', *, max_drift: float = 5e-3) -> None:
+    def __init__(
+        self,
+        params: SensorParams,
+        now_ns: Callable[[], int],
+        streams: Sequence[FramedStream],
+        *,
+        baud: int = 115200,
+        max_drift: float = 5e-3,
+    ) -> None:
+        super().__init__(params, now_ns, baud=baud)
         self.malformed = 0  # frames that passed the checksum and hold another number of bytes than declared
         self.other_frames = 0  # frames of other kinds
         self.restarts = 0  # of the device's clock
         self.deframer = FrameDecoder()
         self.clock = StreamClock(MICROSECONDS, max_drift=max_drift)
         self.trackers = {stream.kind: StreamTracker(stream) for stream in streams}
-        self._frame_id = frame_id
         self._time = CounterUnwrapper(TIME_BITS)
         self._latest_us: dict[int, int] = {}  # time of the last block of each kind
         self._newest_us = 0
@@ -403,15 +385,16 @@ class StreamDecoder(Decoder):
             'other frames': self.other_frames,
             'device restarts': self.restarts,
             'clock_steps': self.clock.steps,
+            **super().counts,
         }
 
     @property
-    def details(self) -> Mapping[str, float]:
+    def details(self) -> Mapping[str, str | float]:
         """How much the device's clock is slow."""
         return {SLOW_CLOCK: PPM * self.clock.drift}
 
     @property
-    def rates_hz(self) -> Mapping[str, float]:
+    def expected_rates_hz(self) -> Mapping[str, float]:
         """Nominal rate of each topic."""
         return {tracker.stream.topic: tracker.stream.rate_hz for tracker in self.trackers.values()}
 
@@ -450,7 +433,14 @@ class StreamDecoder(Decoder):
         counts: NDArray[np.int16] = np.frombuffer(data, dtype=SAMPLE).reshape(-1, len(stream.channels))
         samples = (counts * stream.gains + stream.offsets).astype(np.float32)
         batch = TactileSignal(
-            stamp_ns, stream.sensor, stream.channels, stream.units, stream.rate_hz, index, samples, self._frame_id
+            stamp_ns,
+            stream.sensor,
+            stream.channels,
+            stream.units,
+            stream.rate_hz,
+            index,
+            samples,
+            self._params.frame_id,
         )
         return [(stream.topic, batch)]
 

@@ -21,7 +21,7 @@ from texture_core.types import TactileSignal
 from texture_drivers import serial_line
 from texture_drivers.health import Limits
 from texture_drivers.sensor import SensorParams, load_settings
-from texture_drivers.serial_line import Decoder, SerialSensor
+from texture_drivers.serial_line import SerialSensor
 from texture_drivers.timing import BLOCKS_LATE, PPM, SLOW_CLOCK, ArrivalNumbering, SampleCounter
 
 # --------------------
@@ -384,19 +384,58 @@ REVIVALS = 3  # restarts, as the vendor does, before the port is closed
 REVIVAL_PAUSE_S = 0.05  # between stop and start
 
 
-class Tsf85Decoder(Decoder):
-    """Decode the packets of a hub; see `texture_drivers.serial_line.Decoder`."""
+class Tsf85(SerialSensor):
+    """Read a TSF-85: 'signal' at 1 kHz, 'signal_static' (7 rows of 4 taxels) at a constant rate, 'signal_imu' at 1 kHz.
 
-    def __init__(self, layout: Tsf85Layout, params: SensorParams, prefixes: Mapping[int, str]) -> None:
-        settings = load_settings(Tsf85Settings, params.config)
-        self._prefixes = prefixes
+    The device's stamps number the samples, so losses are known exactly; over an interruption the host's clock
+    does. Taxel images come irregularly (or, from old firmware, repeated each millisecond): the newest one is published
+    at each tick of the static rate. See `texture_core.types.Sensor`.
+
+    Parameters
+    ----------
+    params
+        `device` is a path or 'auto', `finger` 0 or 1, `config` means `Tsf85Settings`.
+    now_ns
+        The host's clock.
+    layout
+        Kind of fingertip.
+    fingers
+        Several fingers instead of `params.finger`; topics are then 'finger0/signal' and so on.
+
+    Raises
+    ------
+    InvalidParameter
+        If there is no such finger, or the settings are wrong.
+    """
+
+    def __init__(
+        self,
+        params: SensorParams,
+        now_ns: Callable[[], int] = time.time_ns,
+        *,
+        layout: Tsf85Layout = TSF85,
+        fingers: Sequence[int] = (),
+    ) -> None:
+        if not fingers and params.finger >= FINGERS:
+            raise InvalidParameter(f"parameter 'finger' is {params.finger}; a TSF-85 has the fingers 0 and 1")
+        super().__init__(params, now_ns, start_command=START_COMMAND, stop_command=STOP_COMMAND)
+        imu = load_settings(Tsf85Settings, params.config).imu
+        self._prefixes = {finger: f'finger{finger}/' for finger in fingers} or {params.finger: ''}
         self._parser = Tsf85Parser(layout)
-        self._splitters = {finger: SampleFrameSplitter(finger) for finger in prefixes}
-        self._fingers = {
-            finger: FingerStream(layout, imu=settings.imu, frame_id=params.frame_id) for finger in prefixes
-        }
+        self._splitters = {finger: SampleFrameSplitter(finger) for finger in self._prefixes}
+        self._fingers = {finger: FingerStream(layout, imu=imu, frame_id=params.frame_id) for finger in self._prefixes}
         self._last_packet: Packet | None = None
         self._frames = self._repeated = 0
+        self._serial = ''
+        self._revived = self._revivals = 0
+
+    def open(self) -> None:
+        """Open the device and start its stream; DeviceError if it cannot be reached."""
+        self.close()
+        self._path = serial_line.resolve(self._params.device, USB_IDS, 'TSF-85')
+        super().open()
+        self._serial = serial_line.serial_number(self._path)
+        self._revivals = 0
 
     @property
     def valid_frames(self) -> int:
@@ -415,15 +454,18 @@ class Tsf85Decoder(Decoder):
             'repeated': self._repeated,
             'damaged_stamps': sum(finger.counter.damaged_stamps for finger in fingers),
             'clock_steps': sum(finger.clock.steps for finger in fingers),
+            'revived': self._revived,
+            **super().counts,
         }
 
     @property
-    def details(self) -> Mapping[str, float]:
-        """How much the device's clock is slow."""
-        return {SLOW_CLOCK: PPM * next(iter(self._fingers.values())).clock.drift}
+    def details(self) -> Mapping[str, str | float]:
+        """Serial number of the USB device if it has one, and how much its clock is slow."""
+        serial = {'serial number': self._serial} if self._serial else {}
+        return {**serial, SLOW_CLOCK: PPM * next(iter(self._fingers.values())).clock.drift}
 
     @property
-    def rates_hz(self) -> Mapping[str, float]:
+    def expected_rates_hz(self) -> Mapping[str, float]:
         """Nominal rate of each topic."""
         return {
             f'{prefix}{topic}': rate
@@ -463,67 +505,6 @@ class Tsf85Decoder(Decoder):
             self._last_packet = packet
         return unique
 
-
-class Tsf85(SerialSensor):
-    """Read a TSF-85: 'signal' at 1 kHz, 'signal_static' (7 rows of 4 taxels) at a constant rate, 'signal_imu' at 1 kHz.
-
-    The device's stamps number the samples, so losses are known exactly; over an interruption the host's clock
-    does. Taxel images come irregularly (or, from old firmware, repeated each millisecond): the newest one is published
-    at each tick of the static rate. See `texture_core.types.Sensor`.
-
-    Parameters
-    ----------
-    params
-        `device` is a path or 'auto', `finger` 0 or 1, `config` means `Tsf85Settings`.
-    now_ns
-        The host's clock.
-    layout
-        Kind of fingertip.
-    fingers
-        Several fingers instead of `params.finger`; topics are then 'finger0/signal' and so on.
-
-    Raises
-    ------
-    InvalidParameter
-        If there is no such finger, or the settings are wrong.
-    """
-
-    def __init__(
-        self,
-        params: SensorParams,
-        now_ns: Callable[[], int] = time.time_ns,
-        *,
-        layout: Tsf85Layout = TSF85,
-        fingers: Sequence[int] = (),
-    ) -> None:
-        if not fingers and params.finger >= FINGERS:
-            raise InvalidParameter(f"parameter 'finger' is {params.finger}; a TSF-85 has the fingers 0 and 1")
-        self._published = fingers or (params.finger,)
-        prefixes = {finger: f'finger{finger}/' for finger in fingers} or {params.finger: ''}
-        decoder = Tsf85Decoder(layout, params, prefixes)
-        super().__init__(params, now_ns, decoder, start_command=START_COMMAND, stop_command=STOP_COMMAND)
-        self._serial = ''
-        self._revived = self._revivals = 0
-
-    def open(self) -> None:
-        """Open the device and start its stream; DeviceError if it cannot be reached."""
-        self.close()
-        self._path = serial_line.resolve(self._params.device, USB_IDS, 'TSF-85')
-        super().open()
-        self._serial = serial_line.serial_number(self._path)
-        self._revivals = 0
-
-    @property
-    def counts(self) -> Mapping[str, int]:
-        """Totals of the decoder, and how often the device was reopened and restarted."""
-        return {**super().counts, 'revived': self._revived}
-
-    @property
-    def details(self) -> Mapping[str, str | float]:
-        """Serial number of the USB device if it has one, and the drift of its clock."""
-        serial = {'serial number': self._serial} if self._serial else {}
-        return {**serial, **super().details}
-
     def _act_on_silence(self) -> None:
         """Wake a device that is open but silent; DeviceError when that does not help."""
         if not self._silent_s:
@@ -538,11 +519,11 @@ class Tsf85(SerialSensor):
         self.send(self._stop_command)
         time.sleep(REVIVAL_PAUSE_S)
         self.send(self._start_command)
-        self._decoder.restart()
+        self.restart()
 
     def _silence_sentence(self) -> str:
         if self._babbles:
-            fingers = ' or '.join(str(finger) for finger in self._published)
+            fingers = ' or '.join(str(finger) for finger in self._prefixes)
             return (
                 f"device '{self._params.device}' sends bytes, but no known packet of finger "
                 f'{fingers}; check the finger, that it is a TSF-85, and its firmware (1.0.6 to 1.1.8 are known)'

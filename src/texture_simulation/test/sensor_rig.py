@@ -132,10 +132,7 @@ CASES: Mapping[str, RigCase] = {
         'signal', 4096.0, 1, feed_pvdf, {'signal': 'pC', 'signal_static': 'N'}, 30_000,
         config='{film_gain_pc: 1.0, force_gain_n: 1.0}',
     ),
-    'anyskin': RigCase(
-        'signal', 250.0, 1, feed_alike(15), {'signal': 'µT', 'temperature': '°C'}, 30_000,
-        config='{rate_hz: 250.0, temperature: true}',
-    ),
+    'anyskin': RigCase('signal', 250.0, 1, feed_alike(15), {'signal': 'µT'}, 30_000, config='{rate_hz: 250.0}'),
 }  # fmt: skip
 
 DEADLINE_S = 30.0

@@ -95,13 +95,6 @@ def test_a_rate_that_nobody_set_is_measured_and_kept(open_rig: Make) -> None:
     assert again.sampling_rate_hz == first.sampling_rate_hz == rig.sensor.expected_rates_hz['signal']
 
 
-def test_the_temperature_is_published_if_wanted(open_rig: Make) -> None:
-    assert 'temperature' not in open_rig('anyskin', config='{rate_hz: 250.0}').read_s(0.2)
-    temperature = open_rig('anyskin').read_s(0.2)['temperature'][-1]
-    assert temperature.channels == ('m0', 'm1', 'm2', 'm3', 'm4')
-    assert temperature.samples == pytest.approx(31.25)
-
-
 def test_the_channels_keep_their_order(open_rig: Make) -> None:
     def feed(device: Any, first: int, ticks: int) -> None:
         counts = counting(first, ticks, 30_000, 8, 1) * np.array([1, 0, 0, 0, 0, 0, 0, -1])[:, None]
