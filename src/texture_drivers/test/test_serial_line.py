@@ -15,7 +15,15 @@ from texture_core.errors import DeviceError
 from texture_core.framing import Frame, pack
 from texture_core.types import lost_samples
 from texture_drivers.sensor import SensorParams
-from texture_drivers.serial_line import FramedSensor, FramedStream, SerialPort, reason_of, resolve, serial_number
+from texture_drivers.serial_line import (
+    FramedSensor,
+    FramedStream,
+    SerialPort,
+    StreamTracker,
+    reason_of,
+    resolve,
+    serial_number,
+)
 from texture_drivers.tsf85 import USB_IDS
 
 SECOND = 1_000_000_000
@@ -121,6 +129,34 @@ def test_two_streams_of_one_line_share_its_clock_and_lose_independently():
     assert (line.trackers[1].lost, line.trackers[2].lost) == (10, 0)
     assert line.clock.steps == 0
     assert np.diff([batch.stamp_ns for batch in static]) == pytest.approx(20e6, rel=0.02)
+
+
+def test_samples_that_the_device_left_out_are_reported_separately_from_lost_frames():
+    tracker = StreamTracker(stream())
+    assert [tracker.place(0, 10, 0), tracker.place(4000 + 5 * 400, 10, 0)] == [0, 15]
+    assert tracker.overrun == 5
+
+
+def test_the_jitter_of_the_devices_stamps_and_its_rounding_move_nothing():
+    tracker = StreamTracker(stream(rate_hz=4096.0))  # 32 samples take 7812.5 µs
+    jitter = [0, 100, -100, 3]
+    assert [tracker.place(int(i * 7812.5) + jitter[i % 4], 32, 0) for i in range(10_000)][-1] == 32 * 9999
+    assert tracker.overrun == 0
+
+
+@pytest.mark.parametrize('true_hz', [2000.0, 3000.0])
+def test_a_wrong_rate_is_named_after_three_seconds(true_hz):
+    tracker = StreamTracker(stream())
+    with pytest.raises(DeviceError, match=f'{true_hz:.4g} samples in a second .* 2500 are set'):
+        for i in range(2000):
+            tracker.place(round(i * 10 / true_hz * 1e6), 10, 0)
+
+
+def test_one_hiccup_of_the_device_is_no_wrong_rate():
+    tracker = StreamTracker(stream())
+    for i in range(2000):
+        tracker.place(4000 * i + (200_000 if i > 500 else 0), 10, 0)
+    assert tracker.overrun == 500
 
 
 def test_other_kinds_and_contradicting_frames_are_counted_and_passed_over():

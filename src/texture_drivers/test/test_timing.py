@@ -9,11 +9,9 @@ import itertools
 import numpy as np
 import pytest
 
-from texture_core.errors import DeviceError
 from texture_drivers.timing import (
     HALF_WIDTH,
     ArrivalNumbering,
-    BlockCounter,
     Decimator,
     RateMeter,
     SampleCounter,
@@ -343,34 +341,3 @@ def test_a_device_that_samples_a_trifle_too_fast_loses_nothing() -> None:
     stamps = [round(i * 0.999) for i in range(10_000)]
     assert counter.place(stamps)[0] == list(range(10_000))
     assert counter.lost == 0
-
-
-BLOCKS_HZ = 2500.0  # 10 samples take 4000 µs
-
-
-def test_samples_that_the_device_left_out_are_reported_separately_from_lost_frames():
-    counter = BlockCounter(BLOCKS_HZ, 'daq')
-    assert [counter.place(0, 10, 0), counter.place(4000 + 5 * 400, 10, 0)] == [0, 15]
-    assert counter.overrun == 5
-
-
-def test_the_jitter_of_the_devices_stamps_and_its_rounding_move_nothing():
-    counter = BlockCounter(4096.0, 'film')  # 32 samples take 7812.5 µs
-    jitter = [0, 100, -100, 3]
-    assert [counter.place(int(i * 7812.5) + jitter[i % 4], 32, 0) for i in range(10_000)][-1] == 32 * 9999
-    assert counter.overrun == 0
-
-
-@pytest.mark.parametrize('true_hz', [2000.0, 3000.0])
-def test_a_wrong_rate_is_named_after_three_seconds(true_hz):
-    counter = BlockCounter(BLOCKS_HZ, 'daq')
-    with pytest.raises(DeviceError, match=f'{true_hz:.4g} samples in a second .* 2500 are set'):
-        for i in range(2000):
-            counter.place(round(i * 10 / true_hz * 1e6), 10, 0)
-
-
-def test_one_hiccup_of_the_device_is_no_wrong_rate():
-    counter = BlockCounter(BLOCKS_HZ, 'daq')
-    for i in range(2000):
-        counter.place(4000 * i + (200_000 if i > 500 else 0), 10, 0)
-    assert counter.overrun == 500

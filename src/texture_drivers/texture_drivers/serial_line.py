@@ -24,7 +24,7 @@ from texture_core.framing import TIME_BITS, CounterUnwrapper, Frame, FrameDecode
 from texture_core.types import NANOSECONDS, Array, TactileSignal
 from texture_drivers.health import Limits
 from texture_drivers.sensor import SensorParams
-from texture_drivers.timing import PPM, SLOW_CLOCK, BlockCounter, StreamClock
+from texture_drivers.timing import PPM, SLOW_CLOCK, StreamClock
 
 # --------------------
 # A stream of a framed protocol, as a sensor declares it.
@@ -285,22 +285,29 @@ class StreamBlock(NamedTuple):
     data: bytes
 
 
+RATE_CHECK_S = 1.0
+MAX_FAILED_CHECKS = 3  # consecutive failures that are no transient
+RATE_TOLERANCE = 0.02  # far more than clocks differ, far less than a wrong setting
+
+
 class StreamTracker:
-    """Follow one stream: number its blocks, and join those that follow each other."""
+    """Follow one stream: number its blocks so that a jump is exactly what was lost, and join those without a gap.
+
+    The device's time shows how many samples are missing, wherever they were lost: lost frames of the line show in their
+    numbers, what is missing beyond them was left out by the device itself and counts as `overrun`.
+    """
 
     def __init__(self, stream: FramedStream) -> None:
         self.stream = stream
         self.samples = 0  # published
         self.lost = 0  # between the first one published and the last
-        self._counter = BlockCounter(stream.rate_hz, stream.sensor)
+        self.overrun = 0  # samples that the device itself left out
+        self._next_index = 0
+        self._next_us: float | None = None  # when the next sample is due by the device's clock
         self._due_ns: int | None = None  # when the next sample would have come, had there been no interruption
         self._carried = 0.0  # lost in interruptions and not counted yet: less than a sample; below 0: counted too many
         self._published: int | None = None  # index after the last one
-
-    @property
-    def overrun(self) -> int:
-        """Samples that the device itself left out."""
-        return self._counter.overrun
+        self._restart_check()
 
     def end_us(self, block: StreamBlock) -> int:
         """Return the device's time at the end of a block's last sample."""
@@ -308,21 +315,34 @@ class StreamTracker:
 
     def interrupt(self, clock: StreamClock) -> None:
         """Note by the old clock when the next sample is due."""
-        if self._counter.next_us is not None and clock.settled:
-            self._due_ns = clock.time_ns(self._counter.next_us)
-        self._counter.resume(0)
+        if self._next_us is not None and clock.settled:
+            self._due_ns = clock.time_ns(self._next_us)
+        self._next_us = None
+        self._restart_check()
+
+    def place(self, time_us: int, rows: int, lost_frames: int) -> int:
+        """Return the index of a block's first sample."""
+        skipped = 0
+        if self._next_us is not None:
+            skipped = max(0, round((time_us - self._next_us) * self.stream.rate_hz / MICROSECONDS))
+        self.overrun += max(0, skipped - lost_frames * rows)
+        self._check_rate(time_us, rows, lost_frames)
+        index = self._next_index + skipped
+        self._next_index = index + rows
+        self._next_us = time_us + rows * MICROSECONDS / self.stream.rate_hz
+        return index
 
     def runs(self, blocks: Sequence[StreamBlock], clock: StreamClock) -> list[tuple[int, int, bytes]]:
         """Return index, stamp in ns and bytes of the samples of consecutive blocks: a new run wherever some miss."""
         if self._due_ns is not None:
             late_ns = max(0.0, clock.time_ns(blocks[0].time_us) - self._due_ns)
             missing = self._carried + late_ns * self.stream.rate_hz / NANOSECONDS
-            self._counter.resume(max(0, round(missing)))
+            self._next_index += max(0, round(missing))
             self._carried, self._due_ns = missing - max(0, round(missing)), None
         runs: list[tuple[int, int, list[bytes]]] = []
         for block in blocks:
-            expected = self._counter.next_index
-            index = self._counter.place(block.time_us, block.rows, block.lost_frames)
+            expected = self._next_index
+            index = self.place(block.time_us, block.rows, block.lost_frames)
             self.lost += 0 if self._published is None else index - self._published
             self._published = index + block.rows
             self.samples += block.rows
@@ -330,6 +350,30 @@ class StreamTracker:
                 runs.append((index, block.time_us, []))
             runs[-1][2].append(block.data)
         return [(index, clock.time_ns(time_us), b''.join(data)) for index, time_us, data in runs]
+
+    def _restart_check(self) -> None:
+        self._since_us: int | None = None
+        self._rows = 0
+        self._failed_checks = 0
+
+    def _check_rate(self, time_us: int, rows: int, lost_frames: int) -> None:
+        """Compare rows with time over stretches in which no frame was lost."""
+        if lost_frames or self._since_us is None:
+            self._since_us, self._rows = time_us, rows
+            return
+        elapsed_s = (time_us - self._since_us) / MICROSECONDS
+        if elapsed_s >= RATE_CHECK_S:
+            rate_hz = self._rows / elapsed_s
+            off = abs(rate_hz / self.stream.rate_hz - 1) > RATE_TOLERANCE
+            self._failed_checks = self._failed_checks + 1 if off else 0
+            if self._failed_checks == MAX_FAILED_CHECKS:
+                raise DeviceError(
+                    f"'{self.stream.sensor}' delivers {rate_hz:.4g} samples in a second of the device's clock, and "
+                    f'{self.stream.rate_hz:.4g} are set; correct the rate in the settings, or lighten the load of the '
+                    'device'
+                )
+            self._since_us, self._rows = time_us, 0
+        self._rows += rows
 
 
 # --------------------
