@@ -67,13 +67,7 @@ def touch_force_n(
 class TwistControllerParams(TouchedSurfaceParams):
     """The emulated controller, its arm, its force sensor and the surface under the finger."""
 
-    lag_s: float = param(
-        0.02,
-        'Time after which a commanded velocity comes into effect.',
-        unit='s',
-        low=0.0,
-        high=0.2,
-    )
+    lag_s: float = param(0.02, 'Time after which a commanded velocity comes into effect.', unit='s', low=0.0, high=0.2)
     jitter_s: float = param(
         0.002,
         'Largest random delay that is added to the lag and to the period of the measurements.',
@@ -84,19 +78,9 @@ class TwistControllerParams(TouchedSurfaceParams):
     max_speed_m_s: float = param(
         0.25, 'Highest speed of the arm; faster commands are scaled down.', unit='m/s', low=0.001, high=3.0
     )
-    max_acceleration_m_s2: float = param(
-        10.0,
-        'Highest acceleration of the arm.',
-        unit='m/s²',
-        low=0.1,
-        high=150.0,
-    )
+    max_acceleration_m_s2: float = param(10.0, 'Highest acceleration of the arm.', unit='m/s²', low=0.1, high=150.0)
     command_timeout_s: float = param(
-        0.1,
-        'How long a command holds without a new one; 0 keeps executing the last one.',
-        unit='s',
-        low=0.0,
-        high=5.0,
+        0.1, 'How long a command holds without a new one; 0 keeps executing the last one.', unit='s', low=0.0, high=5.0
     )
     active: bool = param(True, 'Lets the controller follow commands; false makes it listen without moving the arm.')
     surface_rx_rad: float = param(

@@ -36,11 +36,7 @@ class ControllerTopicParams(FingerPipeParams):
     base_frame_id: str = param('base', 'Name of the base frame; commands in other frames are ignored.')
     tool_frame_id: str = param('tool0_controller', 'Name of the frame of the measured force.')
     rate_hz: float = param(
-        250.0,
-        'Rate of pose and force; a higher rate costs more computing time.',
-        unit='Hz',
-        low=10.0,
-        high=1e3,
+        250.0, 'Rate of pose and force; a higher rate costs more computing time.', unit='Hz', low=10.0, high=1e3
     )
     blink_s: float = param(
         0.0,
