@@ -39,7 +39,7 @@ def test_only_the_distance_of_training_windows_differs_from_the_released_recipe(
 
 def test_peers_are_left_out_where_their_packages_are_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     for there, names in ((False, set()), (True, set(CLASSIFIERS))):
-        monkeypatch.setattr(peers, 'available', lambda there=there: there)
+        monkeypatch.setattr(peers, 'available', lambda *names, there=there: there)
         assert {job.name for job in jobs_of(quick=False)} & set(CLASSIFIERS) == names
 
 
