@@ -51,8 +51,12 @@ test-benchmarks: setup
 	@$(TESTS) -n $(BENCHMARK_JOBS) -m "benchmark and not realtime"
 	@$(CLOCKED) -n $(BENCHMARK_JOBS) -m "benchmark and realtime" || $(call ALONE,benchmark and realtime)
 
+# Those that take minutes and explain how well and how fast surfaces are recognised.
+BENCHMARKS := latency hand papers roughness-latency learning
+
 benchmark: setup
-	@.venv/bin/texture benchmark all
+	@failed=; for name in $(BENCHMARKS); do .venv/bin/texture benchmark $$name || failed="$$failed $$name"; done; \
+		test -z "$$failed" || { echo "failed:$$failed"; exit 1; }
 
 # General classifiers of time series, in packages of their own, on the slides on which the recipes are compared.
 peers: setup

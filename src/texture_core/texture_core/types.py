@@ -797,9 +797,8 @@ class Sensor(Protocol):
     `read` blocks for about one batch and returns what arrived, keyed by topic ('signal', 'signal_static');
     it may return nothing. A device that is gone raises DeviceError from `open` or `read`; the caller closes and
     opens again. `counts` are running totals of this sensor object, kept over reopening. A sensor may also have
-    `details`: what it reports about itself, such as its 'serial number', by name, for the diagnostics; `limits`: the
-    lowest and the highest sample by topic, of all channels or of each, to detect saturation; and `set_bias()`:
-    zeroes the device at its present state, and returns the seconds that this takes.
+    `details`: what it reports about itself, such as its 'serial number', by name, for the diagnostics; and `limits`:
+    the lowest and the highest sample by topic, of all channels or of each, to detect saturation.
     """
 
     def open(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import sys
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,18 +13,17 @@ import pytest
 
 from texture_core.config import from_mapping
 from texture_core.errors import DeviceError, InvalidParameter
-from texture_core.framing import Frame
+from texture_core.framing import Frame, FrameDecoder, pack
 from texture_core.types import TactileSignal, lost_samples
 from texture_drivers.biotac import (
     ERROR_WORDS,
     LAYOUTS,
     QUEUED_FRAMES,
     REPLY,
+    SERIALS,
     BioTac,
     BioTacLayout,
     Cheetah,
-    FrameTracker,
-    SpiFrame,
     decode,
     sampling_command,
 )
@@ -125,36 +124,30 @@ def reply(layout: BioTacLayout = BIOTAC, *, fingers: Sequence[int | None] = (0,)
     return b''.join(b'\x80\x00' + b''.join(map(word, row)) for row in values)
 
 
-class FakeLink:
+class FakeBridge:
     """Frames that come one a read, 10 ms apart; None is a frame that never comes."""
 
-    max_drift = 5e-3
-    serials = ('BT-1', '')
-
-    def __init__(self, frames: Sequence[SpiFrame | None]) -> None:
-        self._coming: Iterator[SpiFrame | None] = iter(frames)
+    def __init__(self, frames: Sequence[Frame | None]) -> None:
+        self.coming = deque(frames)
         self.now_ns = START_NS
-        self.counts = {'bogus': 3}
 
-    def open(self) -> None:
-        pass
-
-    def read(self) -> list[SpiFrame]:
-        frame = next(self._coming, None)
+    def read(self, wait_s: float) -> bytes:
+        frame = self.coming.popleft() if self.coming else None
         self.now_ns += FRAME_NS
-        return [] if frame is None else [frame]
+        return b'' if frame is None else pack(frame)
 
-    def close(self) -> None:
-        pass
+    def write(self, data: bytes) -> None: ...
 
-
-def numbered(numbers: range, content: bytes, *, epoch: int = 1, fingers: int = 1) -> list[SpiFrame]:
-    return [SpiFrame(epoch, number, 10_000 * number, fingers, content) for number in numbers]
+    def close(self) -> None: ...
 
 
-def opened(link: FakeLink, *, finger: int = 0, **options: object) -> BioTac:
-    params = SensorParams(finger=finger, frame_id='tip')
-    sensor = BioTac(params, lambda: link.now_ns, link=link, **options)
+def numbered(numbers: range, content: bytes, *, slots: int = 44, fingers: int = 1) -> list[Frame]:
+    return [Frame(REPLY, 1, number, 10_000 * number, slots, fingers, content) for number in numbers]
+
+
+def opened(bridge: FakeBridge, *, finger: int = 0, **options: object) -> BioTac:
+    sensor = BioTac(SensorParams(finger=finger, frame_id='tip'), lambda: bridge.now_ns, **options)
+    sensor._open_port = lambda: bridge
     sensor.open()
     return sensor
 
@@ -168,9 +161,9 @@ def run(sensor: BioTac, reads: int) -> dict[str, list[TactileSignal]]:
 
 
 def test_each_sample_has_the_time_of_its_slot() -> None:
-    link = FakeLink(numbered(range(50), reply(step=1)))
-    start_ns = link.now_ns  # of the first frame: it comes when it is complete, at the first reading
-    topics = run(opened(link), 50)
+    bridge = FakeBridge(numbered(range(50), reply(step=1)))
+    start_ns = bridge.now_ns  # of the first frame: it comes when it is complete, at the first reading
+    topics = run(opened(bridge), 50)
     signal, static = topics['signal'][-1], topics['signal_static'][-1]
     assert abs(static.stamp_ns - (start_ns + 49 * FRAME_NS)) < 1000
     assert signal.stamp_ns - static.stamp_ns == 227_273
@@ -188,19 +181,18 @@ def test_each_sample_has_the_time_of_its_slot() -> None:
 
 def test_a_lost_frame_is_a_jump_of_22_samples() -> None:
     frames = numbered(range(60), reply())
-    sensor = opened(FakeLink([*frames[:40], None, None, *frames[42:]]))
+    sensor = opened(FakeBridge([*frames[:40], None, None, *frames[42:]]))
     topics = run(sensor, 60)
     assert lost_samples(topics['signal']) == 44
     assert lost_samples(topics['signal_static']) == 2
     assert sensor.counts['lost'] == 44
     assert sensor.counts['samples'] == sum(len(batch.samples) for batch in topics['signal'])
-    assert sensor.counts['bogus'] == 3
 
 
 def test_a_damaged_word_is_nan_in_its_channel_and_finger() -> None:
     content = bytearray(reply(fingers=(100, 200)))
     content[6 * 38 + 4] ^= 1  # slot 38 is PDC; the second finger
-    sensor = opened(FakeLink(numbered(range(40), bytes(content), fingers=2)), fingers=(0, 1))
+    sensor = opened(FakeBridge(numbered(range(40), bytes(content), fingers=2)), fingers=(0, 1))
     topics = run(sensor, 40)
     first, second = topics['finger0/signal_static'][-1].samples[0], topics['finger1/signal_static'][-1].samples[0]
     assert (first == 100).all()
@@ -215,44 +207,31 @@ def test_a_sensor_has_at_most_five_fingers() -> None:
 
 
 def test_a_place_without_a_biotac_is_reported_and_sends_nothing() -> None:
-    sensor = opened(FakeLink(numbered(range(200), reply(fingers=(7, ABSENT)), fingers=2)), finger=1)
+    frames = [Frame(SERIALS, 1, 0, 0, 1, 2, b'BT-1,'), *numbered(range(200), reply(fingers=(7, ABSENT)), fingers=2)]
+    sensor = opened(FakeBridge(frames), finger=1)
     with pytest.raises(DeviceError, match='no BioTac answers as finger 1'):
-        assert not any(run(sensor, 200).values())
+        assert not run(sensor, 200)
+    assert sensor.details['serial of finger 0'] == 'BT-1'
+    assert 'serial of finger 1' not in sensor.details
 
 
-def bridge_frame(sequence: int, time_us: int) -> Frame:
-    return Frame(REPLY, 1, sequence % 2**16, time_us % 2**32, 44, 1, b'')
+@pytest.mark.parametrize(
+    ('frame', 'sentence'),
+    [
+        (Frame(REPLY, 1, 0, 0, 54, 1, bytes(54 * 4)), 'samples frames of 54 slots, .* has 44'),
+        (Frame(REPLY, 1, 0, 0, 44, 1, bytes(44 * 4)), 'finger 1 is requested, .* places 0 to 0'),
+    ],
+)
+def test_another_board_than_the_requested_one_is_reported(frame: Frame, sentence: str) -> None:
+    with pytest.raises(DeviceError, match=sentence):
+        opened(FakeBridge([frame]), finger=1).read()
 
 
-def test_numbers_and_time_go_on_over_their_wrapping() -> None:
-    run_ = FrameTracker(BIOTAC)
-    first_us = 2**32 - 15_000
-    frames = [run_.place(bridge_frame(65_534 + n, first_us + 10_000 * n)) for n in range(4)]
-    assert [frame.number for frame in frames] == [65_534, 65_535, 65_536, 65_537]
-    assert [frame.time_us - first_us for frame in frames] == [0, 10_000, 20_000, 30_000]
-    assert run_.restarts == 0
-
-
-def test_a_device_that_begins_again_or_pauses_begins_another_epoch() -> None:
-    run_ = FrameTracker(BIOTAC)
-    epochs = [
-        run_.place(bridge_frame(number, time_us)).epoch
-        for number, time_us in [(100, 10**6), (101, 1_010_000), (0, 0), (1, 10_000), (5, 50_000), (6, 300_000)]
-    ]
-    assert epochs == [1, 1, 2, 2, 2, 3]
-    assert run_.restarts == 2
-
-
-def test_a_bridge_of_another_pace_is_reported() -> None:
-    run_ = FrameTracker(BIOTAC)
-    with pytest.raises(DeviceError, match=r'takes 10\.40 ms for a frame, and 10\.00 ms are needed'):
-        for number in range(120):
-            run_.place(bridge_frame(number, 10_400 * number))
-    steady = FrameTracker(BIOTAC)
-    jitter_us = (0, 2000, -2000)
-    for number in range(500):
-        steady.place(bridge_frame(number, 10_050 * number + jitter_us[number % 3]))
-    assert steady.restarts == 0
+def test_frames_of_another_length_or_number_of_places_are_counted_and_passed_over() -> None:
+    sensor = opened(FakeBridge([*numbered(range(3), reply()), *numbered(range(3, 6), reply(fingers=(1, 2)), fingers=2),
+                                *numbered(range(6, 9), b'short')]))  # fmt: skip
+    run(sensor, 9)
+    assert sensor.counts['bogus'] == 6
 
 
 SERIAL = b'BT2P0220B11E0004'
@@ -348,51 +327,51 @@ def api(monkeypatch: pytest.MonkeyPatch) -> StandIn:
     return stand_in
 
 
+def came(link: Cheetah, reads: int) -> list[Frame]:
+    return FrameDecoder().feed(b''.join(link.read(0.0) for _ in range(reads)))
+
+
 def test_frames_hold_what_the_biotac_answered_to_each_command(api: StandIn) -> None:
     link = Cheetah(BIOTAC)
-    link.open()
-    frames = [frame for _ in range(3) for frame in link.read()]
-    assert [(frame.number, frame.time_us, frame.fingers) for frame in frames] == [
-        (0, 0, 3),
-        (1, 10_000, 3),
-        (2, 20_000, 3),
+    serials, *frames = came(link, 3)
+    assert (serials.kind, serials.body) == (SERIALS, SERIAL + b',,')
+    assert [(frame.kind, frame.sequence, frame.time_us, frame.rows, frame.columns) for frame in frames] == [
+        (REPLY, number, 10_000 * number, 44, 3) for number in range(3)
     ]
-    replies = decode(frames[0].reply, BIOTAC, 3)
+    replies = decode(frames[0].body, BIOTAC, 3)
     assert replies.damaged.tolist() == [0, 44, 44]
     # The mock answers with bits 6..1 of the command: twice the index, in the upper seven bits of the word.
     slow = dict(zip(BIOTAC.slow_channels, replies.slow[0, :, 0].tolist(), strict=True))
     assert (slow['tdc'], slow['pdc'], slow['electrode1']) == (3 * 32, 1 * 32, 17 * 32)
     assert (replies.pac[:, 0] == 0).all()
-    assert link.serials == (SERIAL.decode(), '', '')
     assert (api.opened, len(api.pending)) == (1, QUEUED_FRAMES)
     link.close()
     link.close()
     assert api.closed == 1
 
 
-def test_after_a_pause_of_the_host_a_new_epoch_begins_behind_the_queue(api: StandIn) -> None:
+def test_after_a_pause_of_the_host_the_time_begins_again_behind_the_queue(api: StandIn) -> None:
     clock = SimpleNamespace(now=0.0)
     link = Cheetah(BIOTAC, lambda: clock.now)
-    link.open()
-    before = link.read()[0].epoch
+    came(link, 1)
     clock.now += 1.0
-    epochs = [link.read()[0].epoch for _ in range(QUEUED_FRAMES + 2)]
-    assert epochs == [before] * QUEUED_FRAMES + [before + 1] * 2
-    assert link.counts == {'pauses': 1}
+    frames = came(link, QUEUED_FRAMES + 2)
+    assert [frame.time_us // 10_000 for frame in frames] == [*range(1, QUEUED_FRAMES + 1), 0, 1]
 
 
 def test_without_the_vendors_module_the_message_states_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, 'cheetah_py', None)
     with pytest.raises(DeviceError, match=r"Total Phase's Python module 'cheetah_py'.*serial bridge"):
-        Cheetah(BIOTAC).open()
+        Cheetah(BIOTAC)
 
 
 def test_an_adapter_in_use_or_failing_is_reported(api: StandIn) -> None:
     link = Cheetah(BIOTAC)
-    link.open()
     api.status = -8
-    with pytest.raises(DeviceError, match=r'submitting commands failed.*communication error'):
-        link.read()
+    for fails in (lambda: link.read(0.0), lambda: Cheetah(BIOTAC)):
+        with pytest.raises(DeviceError, match=r'submitting commands failed.*communication error'):
+            fails()
+    assert api.closed == 1  # the one that could not be opened
     api.ports = [0x8000]
     with pytest.raises(DeviceError, match='no free Cheetah adapter'):
-        Cheetah(BIOTAC).open()
+        Cheetah(BIOTAC)

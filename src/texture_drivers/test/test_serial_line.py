@@ -14,7 +14,16 @@ import serial
 from texture_core.errors import DeviceError
 from texture_core.framing import Frame, pack
 from texture_core.types import lost_samples
-from texture_drivers.serial_line import FramedStream, SerialPort, StreamDecoder, reason_of, resolve, serial_number
+from texture_drivers.sensor import SensorParams
+from texture_drivers.serial_line import (
+    FramedSensor,
+    FramedStream,
+    SerialPort,
+    StreamTracker,
+    reason_of,
+    resolve,
+    serial_number,
+)
 from texture_drivers.tsf85 import USB_IDS
 
 SECOND = 1_000_000_000
@@ -26,6 +35,10 @@ def stream(kind=1, rate_hz=2500.0, channels=('a', 'b'), topic='signal'):
     return FramedStream(
         topic, kind, f'test/{topic}', rate_hz, channels, ('V',) * len(channels), 0.5 * ones, -1.0 * ones
     )
+
+
+def line_of(*streams):
+    return FramedSensor(SensorParams(frame_id='tip'), lambda: 0, streams)
 
 
 def frame(number, *, kind=1, rows=10, rate_hz=2500.0, first_us=0, columns=2):
@@ -49,7 +62,7 @@ def run(line, numbers, offset_ns=START, **how):
 
 
 def test_samples_come_out_in_order_in_units_and_with_their_times():
-    line = StreamDecoder([stream()], 'tip')
+    line = line_of(stream())
     batches = run(line, range(500))['signal']
     samples = np.concatenate([batch.samples for batch in batches])
     skipped = 5000 - len(samples)  # the clock settles for 0.1 s
@@ -63,7 +76,7 @@ def test_samples_come_out_in_order_in_units_and_with_their_times():
 
 
 def test_a_lost_frame_makes_a_jump_of_exactly_its_samples():
-    line = StreamDecoder([stream()])
+    line = line_of(stream())
     batches = run(line, [n for n in range(200) if n not in (100, 101, 150)])['signal']
     assert lost_samples(batches) == line.trackers[1].lost == 30
     truth = [batch.samples[0, 0] * 2 + 2 for batch in batches]
@@ -72,7 +85,7 @@ def test_a_lost_frame_makes_a_jump_of_exactly_its_samples():
 
 
 def test_frames_read_at_once_are_one_batch_and_are_split_where_samples_are_missing():
-    line = StreamDecoder([stream()])
+    line = line_of(stream())
     run(line, range(100))
     data = b''.join(pack(frame(n)) for n in (100, 101, 103, 104))
     batches = line.feed(data, START + round(1050 / 2500 * SECOND))['signal']
@@ -81,7 +94,7 @@ def test_frames_read_at_once_are_one_batch_and_are_split_where_samples_are_missi
 
 
 def test_sequence_and_time_wrap_without_a_trace():
-    line = StreamDecoder([stream()])
+    line = line_of(stream())
     numbers = range(65536 - 100, 65536 + 100)
     first_us = 2**32 - round(65536 * 10 / 2500 * 1e6)  # both wrap at frame 65536
     batches = run(line, numbers, first_us=first_us)['signal']
@@ -91,9 +104,21 @@ def test_sequence_and_time_wrap_without_a_trace():
     np.testing.assert_allclose(steps_ns, 4e6, rtol=0.02)
 
 
+def test_what_is_less_than_a_sample_adds_up_over_many_interruptions():
+    line, at_s = line_of(stream(rate_hz=100.0, channels=('a',))), 0.0
+    for _ in range(101):
+        line.restart()
+        for number in range(20):
+            sent = pack(frame(number, rows=1, rate_hz=100.0, columns=1))
+            line.feed(sent, START + round((at_s + number / 100) * SECOND))
+        at_s += 0.303  # the clock settles for 0.1 s, in which samples are not numbered; 0.3 of one are lost in addition
+    lost = line.trackers[1].lost + line.trackers[1].samples
+    assert lost == pytest.approx((at_s - 0.303 + 0.1) * 100, abs=1.5)
+
+
 def test_two_streams_of_one_line_share_its_clock_and_lose_independently():
     fast, slow = stream(), stream(kind=2, rate_hz=50.0, channels=('f',), topic='signal_static')
-    line = StreamDecoder([fast, slow])
+    line = line_of(fast, slow)
     static = []
     for number in range(500):
         run_ns = START + round((number + 1) / 250 * SECOND)
@@ -106,17 +131,45 @@ def test_two_streams_of_one_line_share_its_clock_and_lose_independently():
     assert np.diff([batch.stamp_ns for batch in static]) == pytest.approx(20e6, rel=0.02)
 
 
+def test_samples_that_the_device_left_out_are_reported_separately_from_lost_frames():
+    tracker = StreamTracker(stream())
+    assert [tracker.place(0, 10, 0), tracker.place(4000 + 5 * 400, 10, 0)] == [0, 15]
+    assert tracker.overrun == 5
+
+
+def test_the_jitter_of_the_devices_stamps_and_its_rounding_move_nothing():
+    tracker = StreamTracker(stream(rate_hz=4096.0))  # 32 samples take 7812.5 µs
+    jitter = [0, 100, -100, 3]
+    assert [tracker.place(int(i * 7812.5) + jitter[i % 4], 32, 0) for i in range(10_000)][-1] == 32 * 9999
+    assert tracker.overrun == 0
+
+
+@pytest.mark.parametrize('true_hz', [2000.0, 3000.0])
+def test_a_wrong_rate_is_named_after_three_seconds(true_hz):
+    tracker = StreamTracker(stream())
+    with pytest.raises(DeviceError, match=f'{true_hz:.4g} samples in a second .* 2500 are set'):
+        for i in range(2000):
+            tracker.place(round(i * 10 / true_hz * 1e6), 10, 0)
+
+
+def test_one_hiccup_of_the_device_is_no_wrong_rate():
+    tracker = StreamTracker(stream())
+    for i in range(2000):
+        tracker.place(4000 * i + (200_000 if i > 500 else 0), 10, 0)
+    assert tracker.overrun == 500
+
+
 def test_other_kinds_and_contradicting_frames_are_counted_and_passed_over():
-    line = StreamDecoder([stream()])
+    line = line_of(stream())
     line.feed(pack(Frame(9, 7, 0, 0, 3, 1, b'else')) + pack(Frame(1, 1, 0, 0, 3, 2, b'short')), START)
     assert (line.other_frames, line.malformed) == (1, 1)
 
 
 def test_a_device_that_speaks_differently_is_reported_in_one_sentence():
     with pytest.raises(DeviceError, match='sends 3 channels, and 2 are named'):
-        StreamDecoder([stream()]).feed(pack(Frame(1, 1, 0, 0, 1, 3, bytes(6))), START)
+        line_of(stream()).feed(pack(Frame(1, 1, 0, 0, 1, 3, bytes(6))), START)
     with pytest.raises(DeviceError, match='sends frames of version 2, and 1 is known'):
-        StreamDecoder([stream()]).feed(pack(Frame(1, 2, 0, 0, 1, 2, bytes(4))), START)
+        line_of(stream()).feed(pack(Frame(1, 2, 0, 0, 1, 2, bytes(4))), START)
 
 
 def test_a_missing_device_is_named_once_with_the_reason_of_the_operating_system(tmp_path):

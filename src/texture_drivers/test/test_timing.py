@@ -9,13 +9,10 @@ import itertools
 import numpy as np
 import pytest
 
-from texture_core.errors import DeviceError
 from texture_drivers.timing import (
     HALF_WIDTH,
     ArrivalNumbering,
-    BlockCounter,
     Decimator,
-    PacketNumbering,
     RateMeter,
     SampleCounter,
     StreamClock,
@@ -221,7 +218,7 @@ def test_after_lost_packets_the_times_are_right_again_within_a_second(n, drift):
     finger, errors = follow(20.0, losing(20.0, (8.0, n)), drift=drift)
     calm = (errors[:, 0] > 3.0) & ((errors[:, 0] < 8.0) | (errors[:, 0] > 8.0 + n / 1000 + CALM_S))
     assert np.abs(errors[calm, 1]).max() < BOUND_S
-    assert finger.cutter.lost == pytest.approx(n, abs=10)
+    assert finger.lost == pytest.approx(n, abs=10)
 
 
 def test_one_packet_in_twenty_lost_at_random_stays_within_the_bound():
@@ -233,13 +230,13 @@ def test_one_packet_in_twenty_lost_at_random_stays_within_the_bound():
 @pytest.mark.parametrize('late_ms', [0.0, 50.0])
 def test_a_busy_host_loses_nothing(late_ms):
     finger, errors = follow(10.0, losing(10.0), late_ms=late_ms)
-    assert finger.cutter.lost == 0
+    assert finger.lost == 0
     assert np.abs(errors[:, 1]).max() < BOUND_S
 
 
 def test_where_there_are_stamps_they_alone_count():
     finger, errors = follow(10.0, losing(10.0, (5.0, 100)), stamped=True)
-    assert finger.cutter.lost == 100
+    assert finger.lost == 100
     assert np.abs(errors[errors[:, 0] > 1.0, 1]).max() < 2e-3
 
 
@@ -339,61 +336,8 @@ def test_the_stamps_themselves_show_how_many_ticks_a_sample_takes(ticks: int, ji
     assert (counter.lost, counter.damaged_stamps) == (7, 0)
 
 
-def test_what_is_less_than_a_packet_adds_up_over_many_interruptions() -> None:
-    numbering, start_ns = PacketNumbering(100.0), 0
-    for _ in range(101):
-        numbering.interrupt()
-        numbering.place(0, 5, start_ns)
-        start_ns += 53 * SECOND // 1000  # five packets, and three tenths of one that is lost
-    assert numbering.lost == pytest.approx(30, abs=1)
-
-
 def test_a_device_that_samples_a_trifle_too_fast_loses_nothing() -> None:
     counter = SampleCounter()
     stamps = [round(i * 0.999) for i in range(10_000)]
     assert counter.place(stamps)[0] == list(range(10_000))
     assert counter.lost == 0
-
-
-BLOCKS_HZ = 2500.0  # 10 samples take 4000 µs
-
-
-def test_a_lost_frame_moves_the_index_by_exactly_its_samples():
-    counter = BlockCounter(BLOCKS_HZ, 'daq')
-    assert [counter.place(0, 10, 0), counter.place(12_000, 10, 2), counter.place(16_000, 10, 0)] == [0, 30, 40]
-    assert counter.overrun == 0
-
-
-def test_samples_that_the_device_left_out_are_reported_separately_from_lost_frames():
-    counter = BlockCounter(BLOCKS_HZ, 'daq')
-    assert [counter.place(0, 10, 0), counter.place(4000 + 5 * 400, 10, 0)] == [0, 15]
-    assert counter.overrun == 5
-
-
-def test_the_jitter_of_the_devices_stamps_and_its_rounding_move_nothing():
-    counter = BlockCounter(4096.0, 'film')  # 32 samples take 7812.5 µs
-    jitter = [0, 100, -100, 3]
-    assert [counter.place(int(i * 7812.5) + jitter[i % 4], 32, 0) for i in range(10_000)][-1] == 32 * 9999
-    assert counter.overrun == 0
-
-
-@pytest.mark.parametrize('true_hz', [2000.0, 3000.0])
-def test_a_wrong_rate_is_named_after_three_seconds(true_hz):
-    counter = BlockCounter(BLOCKS_HZ, 'daq')
-    with pytest.raises(DeviceError, match=f'{true_hz:.4g} samples in a second .* 2500 are set'):
-        for i in range(2000):
-            counter.place(round(i * 10 / true_hz * 1e6), 10, 0)
-
-
-def test_one_hiccup_of_the_device_is_no_wrong_rate():
-    counter = BlockCounter(BLOCKS_HZ, 'daq')
-    for i in range(2000):
-        counter.place(4000 * i + (200_000 if i > 500 else 0), 10, 0)
-    assert counter.overrun == 500
-
-
-def test_after_an_interruption_the_index_goes_on_where_it_is_reported_to():
-    counter = BlockCounter(BLOCKS_HZ, 'daq')
-    counter.place(5_000_000, 10, 0)
-    counter.resume(missing=90)
-    assert counter.place(17, 10, 0) == 100

@@ -24,9 +24,7 @@ from texture_drivers.sensor import SensorParams
 from texture_drivers.tsf85 import (
     AUTOSEND,
     DYNAMIC,
-    START_COMMAND,
     STATIC,
-    STOP_COMMAND,
     TIMESTAMP,
     Item,
     Packet,
@@ -238,19 +236,15 @@ def test_what_the_finger_does_not_measure_is_nan_or_not_published(feeder: Feeder
     assert np.isnan(feeder.others['signal_imu'][-1].samples[-1]).tolist() == [False] * 3 + [True] * 3
 
 
-@pytest.mark.parametrize(
-    ('config', 'columns'), [('{imu: false}', 0), ('{magnetometer: true}', 9), ('{imu: false, magnetometer: true}', 3)]
-)
-def test_the_settings_choose_the_inertial_channels(wire: Wire, clock: Clock, config: str, columns: int) -> None:
-    sensor = Tsf85(SensorParams(device=str(wire.link), batch_s=0.001, config=config), clock)
+def test_the_inertial_channels_are_published_unless_the_settings_say_no(wire: Wire, clock: Clock) -> None:
+    sensor = Tsf85(SensorParams(device=str(wire.link), batch_s=0.001, config='{imu: false}'), clock)
     sensor.open()
     feeder = Feeder(wire, sensor, clock)
     feeder.run(200, more=bytes.fromhex('30 0000 0000 4000 40 0000 0000 0000 50 0001 0000 0000'))
     sensor.close()
-    assert ('signal_imu' in sensor.expected_rates_hz) == bool(columns)
-    assert {batch.samples.shape[1] for batch in feeder.others['signal_imu']} == ({columns} if columns else set())
-    if columns == 3:
-        assert feeder.others['signal_imu'][0].samples[0] == pytest.approx([0.15e-6, 0, 0], rel=1e-5)
+    assert feeder.signal
+    assert 'signal_imu' not in sensor.expected_rates_hz
+    assert not feeder.others['signal_imu']
 
 
 def test_both_fingers_are_read_through_one_opening(wire: Wire, clock: Clock) -> None:
@@ -288,23 +282,16 @@ IMAGE = bytes.fromhex('9A 00 58 39 14') + bytes(range(56))
 INERTIAL = bytes.fromhex('9A 7F 61 07 30 0001 FFFF 4000')
 
 
-def test_a_short_stamp_and_a_dynamic_value_are_read() -> None:
-    assert Tsf85Parser().feed(SHORT_STAMP) == [
-        Packet(AUTOSEND, (Item(TIMESTAMP, 0, (0x6C1E,)), Item(DYNAMIC, 0, (258,))))
-    ]
-
-
-def test_a_long_stamp_and_both_fingers_are_read() -> None:
-    (packet,) = Tsf85Parser().feed(LONG_STAMP)
-    assert packet.items == (Item(TIMESTAMP, 0, (0x6C1E,)), Item(DYNAMIC, 0, (-2,)), Item(DYNAMIC, 1, (-32768,)))
-
-
-def test_an_image_of_the_second_finger_has_28_big_endian_taxels() -> None:
-    (packet,) = Tsf85Parser().feed(IMAGE)
-    (item,) = packet.items
-    assert (item.kind, item.finger) == (STATIC, 1)
-    assert item.values[:2] == (0x0001, 0x0203)
-    assert len(item.values) == 28
+@pytest.mark.parametrize(
+    ('packet', 'items'),
+    [
+        (SHORT_STAMP, [(TIMESTAMP, 0, (0x6C1E,)), (DYNAMIC, 0, (258,))]),
+        (LONG_STAMP, [(TIMESTAMP, 0, (0x6C1E,)), (DYNAMIC, 0, (-2,)), (DYNAMIC, 1, (-32768,))]),
+        (IMAGE, [(STATIC, 1, tuple(range(0x0001, 0x3800, 0x0202)))]),  # 28 taxels, big-endian
+    ],
+)
+def test_the_items_of_a_packet_are_read(packet: bytes, items: list[tuple[int, int, tuple[int, ...]]]) -> None:
+    assert Tsf85Parser().feed(packet) == [Packet(AUTOSEND, tuple(Item(*item) for item in items))]
 
 
 def test_a_packet_comes_out_with_its_last_byte_wherever_the_stream_is_cut() -> None:
@@ -340,19 +327,9 @@ def test_a_packet_that_lost_a_byte_is_refused_even_if_the_stream_pauses_there() 
     parser = Tsf85Parser()
     assert parser.feed(SHORT_STAMP[:-1] + b'\x9a') == []
     assert len(parser.feed(SHORT_STAMP[1:])) == 1
-    assert parser.packets == 1
 
 
 @given(st.binary(max_size=600))
 def test_the_stream_is_found_again_after_any_noise(noise: bytes) -> None:
     packets = Tsf85Parser().feed(noise + SHORT_STAMP * 60)
     assert packets[-20:] == Tsf85Parser().feed(SHORT_STAMP) * 20
-
-
-def test_the_commands_are_those_of_the_vendor() -> None:
-    assert bytes.fromhex('9A 00 58 01 01') == START_COMMAND
-    assert bytes.fromhex('9A 00 58 01 00') == STOP_COMMAND
-
-
-MS = 1_000_000
-START_NS = 1_700_000_000_000_000_000

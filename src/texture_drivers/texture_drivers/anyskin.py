@@ -7,7 +7,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +16,7 @@ from texture_core.config import param
 from texture_core.types import TactileSignal
 from texture_drivers.health import Limits
 from texture_drivers.sensor import SensorParams, load_settings
-from texture_drivers.serial_line import Decoder, SerialSensor
+from texture_drivers.serial_line import SerialSensor
 from texture_drivers.timing import PPM, SLOW_CLOCK, ArrivalNumbering, RateMeter
 
 # --------------------
@@ -39,9 +38,7 @@ RANGE_UT = 4_900.0
 # measurement.
 SMALLEST = 1e-3
 
-SIGNAL, TEMPERATURE = 'signal', 'temperature'
-FIELD_SENSOR, TEMPERATURE_SENSOR = 'anyskin/field', 'anyskin/temperature'
-FIELD_UNIT, TEMPERATURE_UNIT = 'µT', '°C'
+SIGNAL, FIELD_SENSOR, FIELD_UNIT = 'signal', 'anyskin/field', 'µT'
 # Until the rate has been measured: the filters of the magnetometers and the I2C bus set it, and the vendor names none.
 USUAL_RATE_HZ = 100.0
 
@@ -171,7 +168,6 @@ def in_range(values: Values) -> NDArray[np.bool_]:
 # The AnySkin as a sensor of the suite: the field at each magnetometer on 'signal'.
 
 MAX_DRIFT = 0.02  # the device's pace is that of its loop, not of an oscillator
-Topics = dict[str, list[TactileSignal]]
 
 
 @dataclass(frozen=True)
@@ -190,16 +186,14 @@ class AnySkinSettings:
         low=0.0,
         high=2000.0,
     )
-    temperature: bool = param(False, "Publishes the temperature of each magnetometer on the topic 'temperature'.")
 
 
-class AnySkinDecoder(Decoder):
-    """Decode the frames of an AnySkin; see `texture_drivers.serial_line.Decoder`."""
+class AnySkin(SerialSensor):
+    """Read an AnySkin or ReSkin; `params.config` means `AnySkinSettings`. See `texture_core.types.Sensor`."""
 
-    def __init__(self, settings: AnySkinSettings, batch_s: float, frame_id: str = '') -> None:
-        self._settings = settings
-        self._batch_s = batch_s
-        self._signal = partial(TactileSignal, frame_id=frame_id)
+    def __init__(self, params: SensorParams, now_ns: Callable[[], int] = time.time_ns) -> None:
+        super().__init__(params, now_ns)
+        settings = load_settings(AnySkinSettings, params.config)
         self._parser = FrameParser(settings.magnetometers)
         self._channels = field_channels(settings.magnetometers)
         self._meter = RateMeter()
@@ -222,19 +216,18 @@ class AnySkinDecoder(Decoder):
             'bogus': self._parser.refused,
             'refused_bytes': self._parser.refused_bytes,
             'clock_steps': self._numbering.clock.steps if self._numbering else 0,
+            **super().counts,
         }
 
     @property
-    def details(self) -> Mapping[str, float]:
+    def details(self) -> Mapping[str, str | float]:
         """How much the device is slower than its rate."""
         return {SLOW_CLOCK: PPM * self._numbering.clock.drift if self._numbering else 0.0}
 
     @property
-    def rates_hz(self) -> Mapping[str, float]:
-        """Rate of each topic; the usual one until it has been measured."""
-        rate_hz = self._rate_hz or USUAL_RATE_HZ
-        topics = (SIGNAL, *((TEMPERATURE,) if self._settings.temperature else ()))
-        return dict.fromkeys(topics, rate_hz)
+    def expected_rates_hz(self) -> Mapping[str, float]:
+        """Rate of the field; the usual one until it has been measured."""
+        return {SIGNAL: self._rate_hz or USUAL_RATE_HZ}
 
     @property
     def limits(self) -> Limits:
@@ -260,47 +253,26 @@ class AnySkinDecoder(Decoder):
                 self._rate_hz = float(max(1, round(rate_hz)))
                 self._numbering = self._make_numbering()
             return {}
-        return self._batches(runs, self._numbering.place(blocks, arrival_ns), self._numbering)
+        # A batch of each run; none while there are no indices.
+        indices = self._numbering.place(blocks, arrival_ns)
+        batches = [self._batch(index, run.values) for index, run in zip(indices, runs, strict=False)]
+        return {SIGNAL: batches} if batches else {}
 
     def _make_numbering(self) -> ArrivalNumbering:
-        return ArrivalNumbering(self._rate_hz, block_s=self._batch_s, max_drift=MAX_DRIFT)
+        return ArrivalNumbering(self._rate_hz, block_s=self._params.batch_s, max_drift=MAX_DRIFT)
 
-    def _batches(self, runs: Sequence[FrameRun], indices: Sequence[int], numbering: ArrivalNumbering) -> Topics:
-        """Return a batch of each run; none while there are no indices."""
-        topics: Topics = {}
-        for index, run in zip(indices, runs, strict=False):
-            stamp_ns = numbering.clock.time_ns(index)
-            self._lost += 0 if self._next_published is None else index - self._next_published
-            self._next_published = index + len(run.values)
-            self._samples += len(run.values)
-            topics.setdefault(SIGNAL, []).append(self._field(stamp_ns, index, run.values))
-            if self._settings.temperature:
-                topics.setdefault(TEMPERATURE, []).append(self._temperature(stamp_ns, index, run.values))
-        return topics
-
-    def _field(self, stamp_ns: int, index: int, values: Values) -> TactileSignal:
-        samples = values[..., 1:].reshape(len(values), -1).astype(np.float32)
-        return self._signal(
-            sensor=FIELD_SENSOR, channels=self._channels, units=(FIELD_UNIT,) * len(self._channels),
-            sampling_rate_hz=self._rate_hz, stamp_ns=stamp_ns, first_sample=index, samples=samples,
-        )  # fmt: skip
-
-    def _temperature(self, stamp_ns: int, index: int, values: Values) -> TactileSignal:
-        channels = tuple(f'm{number}' for number in range(self._settings.magnetometers))
-        return self._signal(
-            sensor=TEMPERATURE_SENSOR, channels=channels, units=(TEMPERATURE_UNIT,) * len(channels),
-            sampling_rate_hz=self._rate_hz, stamp_ns=stamp_ns, first_sample=index,
-            samples=values[..., 0].astype(np.float32),
-        )  # fmt: skip
-
-
-def anyskin(params: SensorParams, now_ns: Callable[[], int] = time.time_ns) -> SerialSensor:
-    """Return the sensor; `params.config` means `AnySkinSettings`.
-
-    Raises
-    ------
-    UnknownName, InvalidParameter
-        If the settings are wrong.
-    """
-    settings = load_settings(AnySkinSettings, params.config)
-    return SerialSensor(params, now_ns, AnySkinDecoder(settings, params.batch_s, params.frame_id))
+    def _batch(self, index: int, values: Values) -> TactileSignal:
+        assert self._numbering is not None
+        self._lost += 0 if self._next_published is None else index - self._next_published
+        self._next_published = index + len(values)
+        self._samples += len(values)
+        return TactileSignal(
+            stamp_ns=self._numbering.clock.time_ns(index),
+            sensor=FIELD_SENSOR,
+            channels=self._channels,
+            units=(FIELD_UNIT,) * len(self._channels),
+            sampling_rate_hz=self._rate_hz,
+            first_sample=index,
+            samples=values[..., 1:].reshape(len(values), -1).astype(np.float32),
+            frame_id=self._params.frame_id,
+        )

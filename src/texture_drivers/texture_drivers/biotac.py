@@ -1,65 +1,25 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""SynTouch BioTac: protocol over a Cheetah adapter, messages of the vendor's driver, the sensor."""
+"""SynTouch BioTac: the protocol of its board, read through a serial bridge or a Cheetah adapter, and the sensor."""
 
 from __future__ import annotations
 
 import importlib
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
-from itertools import groupby
-from typing import Any, NamedTuple
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from texture_core.errors import DeviceError, InvalidData
-from texture_core.framing import SEQUENCE_BITS, TIME_BITS, CounterUnwrapper, Frame, FrameDecoder
+from texture_core.framing import Frame, pack
 from texture_core.types import NANOSECONDS, TactileSignal
 from texture_drivers.health import Limits
 from texture_drivers.sensor import SensorParams
-from texture_drivers.serial_line import SerialPort
-from texture_drivers.timing import PPM, SLOW_CLOCK, PacketNumbering, StreamClock
-
-# --------------------
-# How the replies of a BioTac board reach this computer: what every link offers.
-
-
-class SpiFrame(NamedTuple):
-    """The reply to all sampling commands of one frame."""
-
-    epoch: int
-    number: int
-    time_us: int
-    fingers: int
-    reply: bytes
-
-
-class SpiLink:
-    """The link to a board; `counts` are totals kept over reopening."""
-
-    max_drift: float  # largest relative error of its clock
-    serials: tuple[str, ...] = ()  # of the BioTac at each place, '' where there is none
-
-    def open(self) -> None:
-        """Open the link and start sampling; DeviceError if it is missing."""
-        raise NotImplementedError
-
-    def read(self) -> Sequence[SpiFrame]:
-        """Wait for about one frame and return those that came, in order; DeviceError if the device is gone."""
-        raise NotImplementedError
-
-    def close(self) -> None:
-        """Stop; never raises, may be called twice."""
-        raise NotImplementedError
-
-    @property
-    def counts(self) -> Mapping[str, int]:
-        """Return the faults of the link."""
-        raise NotImplementedError
-
+from texture_drivers.serial_line import VERSION, FramedSensor, FramedStream, Port
 
 # --------------------
 # Numbers of the BioTac's protocol and streams.
@@ -154,146 +114,15 @@ class BioTacLayout:
         return len(self.slots) * (ECHO_BYTES + WORD_BYTES * fingers)
 
 
-def signal_makers(
-    layout: BioTacLayout, pac_rate_hz: float, slow_rate_hz: float, frame_id: str
-) -> tuple[Callable[..., TactileSignal], Callable[..., TactileSignal]]:
-    """Return what makes the batches of PAC and of the slow channels, out of stamp, first sample and samples."""
-    slow = {'channels': layout.slow_channels, 'units': (UNIT,) * len(layout.slow_channels)}
-    signal = partial(TactileSignal, frame_id=frame_id)
-    return (
-        partial(signal, sensor=PAC_SENSOR, channels=(PAC,), units=(UNIT,), sampling_rate_hz=pac_rate_hz),
-        partial(signal, sensor=SLOW_SENSOR, sampling_rate_hz=slow_rate_hz, **slow),
-    )
-
-
 LAYOUTS: Mapping[str, BioTacLayout] = {
     'biotac': BioTacLayout(electrodes=19),  # 44 slots, 100 frames/s
     'biotac_sp': BioTacLayout(electrodes=24),  # 54 slots, 81.5 frames/s
 }
-FINGERS = 5  # most that one board holds
 
-
-# --------------------
-# A microcontroller that samples a BioTac board over SPI and streams the replies over a serial line.
-#
-# A design of this project, for users without a Cheetah adapter: see docs/sensors.md. It sends unrequested, framed as in
-# `texture_core.framing`: the reply to one frame of sampling commands in each, and now and then the serial numbers.
-
-VERSION = 1
+# A microcontroller samples the board over SPI and streams the replies over a serial line, framed as in
+# `texture_core.framing`: the reply to all sampling commands in each frame, and now and then the serial numbers. A
+# design of this project, for users without a Cheetah adapter: see docs/sensors.md.
 REPLY, SERIALS = 0x42, 0x53  # kinds of frames: 'B' and 'S'
-POLLS = 5  # looks at the port per waiting time: the arrival of a frame gives its time
-LATE_FRAMES = 0.5  # a frame further than this from where its number puts it: the bridge stopped or restarted
-RATE_CHECK_S = 1.0
-RATE_TOLERANCE = 0.02  # far more than clocks differ, far less than slots made of delays instead of by a timer
-
-
-class SerialBridge(SpiLink):
-    """The replies that a bridge sends, in order and each once. See `SpiLink`."""
-
-    max_drift = 5e-3  # the internal oscillator of a microcontroller on USB is right to 0.25 %
-
-    def __init__(self, device: str, layout: BioTacLayout, wait_s: float = 0.01) -> None:
-        self._device = device
-        self._layout = layout
-        self._wait_s = wait_s
-        self._port: SerialPort | None = None
-        self._deframer = FrameDecoder()
-        self._tracker = FrameTracker(layout)
-        self._unknown_frames = 0
-
-    def open(self) -> None:
-        """Open the port; DeviceError if it is not there."""
-        self.close()
-        self._port = SerialPort(self._device)
-        self._deframer.restart()
-        self._tracker.restart()
-
-    def read(self) -> Sequence[SpiFrame]:
-        """Wait for bytes and return the replies they complete."""
-        if self._port is None:
-            raise DeviceError(f"device '{self._device}' is not open; open it before reading")
-        data = b''
-        for _ in range(POLLS):
-            time.sleep(self._wait_s / POLLS)
-            data += self._port.read()
-            if data:
-                break
-        return [reply for frame in self._deframer.feed(data) if (reply := self._decode(frame)) is not None]
-
-    def close(self) -> None:
-        """Close the port."""
-        if self._port is not None:
-            self._port.close()
-            self._port = None
-
-    @property
-    def counts(self) -> Mapping[str, int]:
-        """Damaged or unknown frames, frames that came twice, and stops or resets of the device."""
-        return {
-            'bogus': self._deframer.bad_frames + self._unknown_frames,
-            'repeated': self._deframer.repeated,
-            'restarts': self._tracker.restarts,
-        }
-
-    def _decode(self, frame: Frame) -> SpiFrame | None:
-        """Return the reply in a frame, if it is one."""
-        if frame.version == VERSION and frame.kind == SERIALS:
-            self.serials = tuple(frame.body.decode('ascii', 'replace').split(','))
-            return None
-        fits = frame.columns > 0 and len(frame.body) == frame.rows * (ECHO_BYTES + WORD_BYTES * frame.columns)
-        if frame.version != VERSION or frame.kind != REPLY or not fits:
-            self._unknown_frames += 1
-            return None
-        if frame.rows != len(self._layout.slots):
-            raise DeviceError(
-                f"the bridge on '{self._device}' samples frames of {frame.rows} slots, and this kind of BioTac has "
-                f'{len(self._layout.slots)}; choose the sensor with the right one, or change the bridge'
-            )
-        return self._tracker.place(frame)
-
-
-class FrameTracker:
-    """Unwrap the numbers and the clock of a device, and detect when they restart."""
-
-    def __init__(self, layout: BioTacLayout) -> None:
-        self.restarts = 0
-        self._epoch = 0
-        self._frame_us = layout.frame_s * 1e6
-        self.restart()
-
-    def restart(self) -> None:
-        """Begin a new epoch: another stream."""
-        self._epoch += 1
-        self._number = CounterUnwrapper(SEQUENCE_BITS)
-        self._time_us = CounterUnwrapper(TIME_BITS)
-        self._checked: SpiFrame | None = None
-
-    def place(self, frame: Frame) -> SpiFrame:
-        """Return the frame with its number and time."""
-        steps, elapsed_us = self._number.step(frame.sequence), self._time_us.step(frame.time_us)
-        late_us = abs(elapsed_us - steps * self._frame_us)
-        steady = steps > 0 and late_us <= (LATE_FRAMES + RATE_TOLERANCE * steps) * self._frame_us
-        if self._number.value is not None and not steady:
-            self.restarts += 1
-            self.restart()
-        number, time_us = self._number.advance(frame.sequence), self._time_us.advance(frame.time_us)
-        unwrapped = SpiFrame(self._epoch, number, time_us, frame.columns, frame.body)
-        self._check_rate(unwrapped)
-        return unwrapped
-
-    def _check_rate(self, frame: SpiFrame) -> None:
-        before = self._checked or frame
-        elapsed_us = frame.time_us - before.time_us
-        if elapsed_us < RATE_CHECK_S * 1e6:
-            self._checked = before
-            return
-        self._checked = frame
-        frame_us = elapsed_us / (frame.number - before.number)
-        if abs(frame_us / self._frame_us - 1) > RATE_TOLERANCE:
-            raise DeviceError(
-                f'the bridge takes {frame_us / 1000:.2f} ms for a frame, and {self._frame_us / 1000:.2f} ms are needed'
-                '; let a timer of the bridge start a slot every 227.27 µs'
-            )
 
 
 # --------------------
@@ -317,23 +146,13 @@ QUEUED_FRAMES = 16  # submitted ahead: the adapter samples on while the host is 
 ADAPTERS = 16
 
 
-class Cheetah(SpiLink):
-    """Frames sampled back to back by a Cheetah adapter. See `SpiLink`."""
-
-    max_drift = 2e-2  # the slots are made of delays, whose sum is nominal
+class Cheetah:
+    """A Cheetah adapter as a port: it samples frames back to back and delivers them as a bridge does."""
 
     def __init__(self, layout: BioTacLayout, now_s: Callable[[], float] = time.monotonic) -> None:
         self._layout = layout
         self._now_s = now_s
-        self._api: Any = None
         self._handle = 0
-        self._epoch = self._number = self._pauses = 0
-        self._last_s = 0.0
-        self._pause_at: int | None = None
-
-    def open(self) -> None:
-        """Open the first free adapter and start sampling; DeviceError if there is none."""
-        self.close()
         try:
             self._api = importlib.import_module(MODULE)
         except ImportError as error:
@@ -341,21 +160,23 @@ class Cheetah(SpiLink):
                 f"the Cheetah adapter needs Total Phase's Python module '{MODULE}' and its library, which cannot be "
                 f'imported ({error}); put them on PYTHONPATH, or use a serial bridge as the device'
             ) from error
-        self._handle = self._open_first()
-        self._configure()
-        self.serials = tuple(self._serial(select) for select in SELECT)
-        self._queue_frame()
-        for _ in range(QUEUED_FRAMES):
-            self._checked(self._api.ch_spi_async_submit(self._handle), 'submitting commands')
-        self._epoch += 1
-        self._number = 0
+        try:
+            self._handle = self._open_first()
+            self._configure()
+            serials = [self._serial(select) for select in SELECT]
+            self._queue_frame()
+            for _ in range(QUEUED_FRAMES):
+                self._checked(self._api.ch_spi_async_submit(self._handle), 'submitting commands')
+        except DeviceError:
+            self.close()
+            raise
+        self._coming = pack(Frame(SERIALS, VERSION, 0, 0, 1, len(SELECT), ','.join(serials).encode('ascii', 'replace')))
+        self._frames = self._first = 0  # frames so far, and the one at which the time began
+        self._pause_at: int | None = None
         self._last_s = self._now_s()
-        self._pause_at = None
 
-    def read(self) -> Sequence[SpiFrame]:
-        """Wait for one frame and return it."""
-        if not self._handle:
-            raise DeviceError('the Cheetah adapter is not open; open it before reading')
+    def read(self, wait_s: float) -> bytes:
+        """Wait for one frame, however long that is, and return it."""
         size = self._layout.frame_bytes(len(SELECT))
         received, data = self._api.ch_spi_async_collect(self._handle, size)
         self._checked(received, 'collecting replies')
@@ -363,10 +184,14 @@ class Cheetah(SpiLink):
         if received != size:
             raise DeviceError(f'the Cheetah adapter returned {received} bytes of {size}; replug it')
         self._note_pauses()
-        time_us = round(self._number * self._layout.frame_s * 1e6)
-        frame = SpiFrame(self._epoch, self._number, time_us, len(SELECT), bytes(data))
-        self._number += 1
-        return [frame]
+        time_us = round((self._frames - self._first) * self._layout.frame_s * 1e6)
+        frame = Frame(REPLY, VERSION, self._frames, time_us, len(self._layout.slots), len(SELECT), bytes(data))
+        self._frames += 1
+        coming, self._coming = self._coming + pack(frame), b''
+        return coming
+
+    def write(self, data: bytes) -> None:
+        """Send nothing: it samples unrequested."""
 
     def close(self) -> None:
         """Let the adapter go."""
@@ -374,21 +199,14 @@ class Cheetah(SpiLink):
             self._api.ch_close(self._handle)
             self._handle = 0
 
-    @property
-    def counts(self) -> Mapping[str, int]:
-        """How often sampling paused because the host was away."""
-        return {'pauses': self._pauses}
-
     def _note_pauses(self) -> None:
-        """Begin a new epoch after the frames still queued, when the host was away for longer than they lasted."""
+        """Begin the time again behind the frames still queued, when the host was away for longer than they lasted."""
         now_s = self._now_s()
         if now_s - self._last_s > QUEUED_FRAMES * self._layout.frame_s:
-            self._pauses += 1
-            self._pause_at = self._number + QUEUED_FRAMES
+            self._pause_at = self._frames + QUEUED_FRAMES
         self._last_s = now_s
-        if self._number == self._pause_at:
-            self._epoch += 1
-            self._pause_at = None
+        if self._frames == self._pause_at:
+            self._first, self._pause_at = self._frames, None
 
     def _open_first(self) -> int:
         found, ports, _ = self._api.ch_find_devices_ext(ADAPTERS, ADAPTERS)
@@ -498,18 +316,17 @@ def decode(frames: bytes, layout: BioTacLayout, fingers: int) -> Replies:
 # --------------------
 # The BioTac fingertip as a sensor of the suite.
 
-SILENCE_S = 1.0  # without a whole frame, or without a good word, the board or the finger is not there
-MICROSECONDS_PER_S = 1e6
 CHEETAH = 'cheetah'
-Topics = dict[str, list[TactileSignal]]
+BRIDGE_DRIFT = 5e-3  # the internal oscillator of a microcontroller on USB is right to 0.25 %
+CHEETAH_DRIFT = 2e-2  # the slots are made of delays, whose sum is nominal
 
 
-class BioTac:
+class BioTac(FramedSensor):
     """Read BioTacs of one board: 'signal' is PAC at 2200 Hz, 'signal_static' all else at 100 Hz, in counts.
 
     The stamp of a PAC batch is the time of its first sample, one slot (227 µs) after the start of the frame; that of
     a static row is the start of its frame, and its channels were sampled up to a frame later
-    (`BioTacLayout.slow_slots`). The device's numbers show losses exactly, its clock gives the times; over an
+    (`BioTacLayout.slow_slots`). The device's clock shows losses exactly and gives the times; over an
     interruption the host's clock does. See `texture_core.types.Sensor`.
 
     Parameters
@@ -523,8 +340,6 @@ class BioTac:
         Kind of BioTac.
     fingers
         Several places instead of `params.finger`; topics are then 'finger0/signal' and so on.
-    link
-        Another link to the board than `params.device` names.
     """
 
     def __init__(
@@ -534,59 +349,43 @@ class BioTac:
         *,
         layout: BioTacLayout = LAYOUTS['biotac'],
         fingers: Sequence[int] = (),
-        link: SpiLink | None = None,
     ) -> None:
-        self._params = params
-        self._now_ns = now_ns
+        slow = FramedStream(  # its samples are whole frames
+            topic='signal_static',
+            kind=REPLY,
+            sensor=SLOW_SENSOR,
+            rate_hz=layout.frame_rate_hz,
+            channels=layout.slow_channels,
+            units=(UNIT,) * len(layout.slow_channels),
+            gains=np.ones(len(layout.slow_channels)),
+            offsets=np.zeros(len(layout.slow_channels)),
+            sample_s=layout.frame_s,
+        )
+        max_drift = CHEETAH_DRIFT if params.device == CHEETAH else BRIDGE_DRIFT
+        super().__init__(params, now_ns, [slow], max_drift=max_drift)
         self._layout = layout
-        self._signals = signal_makers(layout, layout.pac_rate_hz, layout.frame_rate_hz, params.frame_id)
         self._prefixes = {finger: f'finger{finger}/' for finger in fingers} or {params.finger: ''}
-        board = Cheetah(layout) if params.device == CHEETAH else SerialBridge(params.device, layout, params.batch_s)
-        self._link = link or board
-        self._clock = StreamClock(MICROSECONDS_PER_S, max_drift=self._link.max_drift)
-        self._numbers = PacketNumbering(layout.frame_rate_hz)
-        self._epoch: int | None = None
-        self._last_received_ns: dict[int, int] = {}  # finger: when it last sent a good word; -1 for the board
-        self._opened = self._samples = self._damaged = self._refused = 0
+        self._places = 0  # of the board; 0 until its first frame
+        self._damaged = self._refused = self._answered = 0
+        self._unanswered = 0  # frames since the last one in which a requested finger answered
+        self._serials: tuple[str, ...] = ()  # of the BioTac at each place, '' where there is none
 
-    def open(self) -> None:
-        """Open the link; DeviceError if it is not there."""
-        self._link.open()
-        self._opened += 1
-        self._last_received_ns = dict.fromkeys([-1, *self._prefixes], self._now_ns())
-
-    def read(self) -> Mapping[str, Sequence[TactileSignal]]:
-        """Wait for about one frame and return what arrived."""
-        frames = self._link.read()
-        now_ns = self._now_ns()
-        topics: Topics = {topic: [] for topic in self.expected_rates_hz}
-        for run in consecutive(frames):
-            self._process(run, now_ns, topics)
-        self._watch_silence(now_ns)
-        return topics
-
-    def close(self) -> None:
-        """Close the link."""
-        self._link.close()
+    @property
+    def valid_frames(self) -> int:
+        """Frames in which a requested finger answered."""
+        return self._answered
 
     @property
     def counts(self) -> Mapping[str, int]:
         """Totals; 'samples' and 'lost' are of PAC of one finger, 'damaged_words' and 'refused_words' of all read."""
+        counts, per_frame = super().counts, self._layout.pac_per_frame
         return {
-            'samples': self._samples,
-            'lost': self._numbers.lost * self._layout.pac_per_frame,
+            **counts,
+            'samples': counts['samples'] * per_frame,
+            'lost': counts['lost'] * per_frame,
             'damaged_words': self._damaged,
             'refused_words': self._refused,
-            'reopened': max(0, self._opened - 1),
-            'clock_steps': self._clock.steps,
-            **self._link.counts,
         }
-
-    @property
-    def details(self) -> Mapping[str, str | float]:
-        """Serial number of each BioTac that reported it, and how much the device's clock is slow."""
-        serials = {f'serial of finger {place}': serial for place, serial in enumerate(self._link.serials) if serial}
-        return {**serials, SLOW_CLOCK: PPM * self._clock.drift}
 
     @property
     def expected_rates_hz(self) -> Mapping[str, float]:
@@ -599,62 +398,92 @@ class BioTac:
         """Ends of the 12 bits by topic."""
         return dict.fromkeys(self.expected_rates_hz, (0, FULL_SCALE))
 
-    def _process(self, run: Sequence[SpiFrame], now_ns: int, topics: Topics) -> None:
-        """Make batches of consecutive frames, once their times are known."""
-        first_frame, last = run[0], run[-1]
-        self._check_places(last.fingers)
-        self._last_received_ns[-1] = now_ns
-        if first_frame.epoch != self._epoch:
-            self._epoch = first_frame.epoch
-            self._numbers.interrupt()
-            self._clock.restart()
-        # A frame is sent when its last slot has been sampled.
-        self._clock.observe(last.time_us + round(self._layout.frame_s * MICROSECONDS_PER_S), now_ns)
-        if not self._clock.settled:
-            return
-        start_ns = self._clock.time_ns(first_frame.time_us)
-        index = self._numbers.place(first_frame.number, len(run), start_ns)
-        replies = decode(b''.join(frame.reply for frame in run), self._layout, last.fingers)
-        self._samples += len(replies.pac)
-        for finger, prefix in self._prefixes.items():
-            self._damaged += int(replies.damaged[finger])
-            self._refused += int(replies.refused[finger])
-            if replies.damaged[finger] == len(run) * len(self._layout.slots):
-                continue  # no answer
-            self._last_received_ns[finger] = now_ns
-            pac, slow = self._signals
-            stamp_ns, first = start_ns + round(SLOT_NS), index * self._layout.pac_per_frame
-            samples = replies.pac[:, finger : finger + 1]
-            topics[f'{prefix}signal'].append(pac(stamp_ns=stamp_ns, first_sample=first, samples=samples))
-            samples = replies.slow[:, :, finger]
-            topics[f'{prefix}signal_static'].append(slow(stamp_ns=start_ns, first_sample=index, samples=samples))
+    def restart(self) -> None:
+        """Resume after an interruption, with the index according to the host's clock."""
+        self._unanswered = self._places = 0
+        super().restart()
 
-    def _check_places(self, places: int) -> None:
-        missing = [finger for finger in self._prefixes if finger >= places]
+    def _rows(self, frame: Frame) -> int:
+        if frame.kind == SERIALS:
+            self._serials = tuple(frame.body.decode('ascii', 'replace').split(','))
+            return 0
+        return super()._rows(frame)
+
+    def _rows_of(self, stream: FramedStream, frame: Frame) -> int:
+        if not frame.columns or frame.columns != (self._places or frame.columns):
+            return 0
+        if len(frame.body) != frame.rows * (ECHO_BYTES + WORD_BYTES * frame.columns):
+            return 0
+        if frame.rows != len(self._layout.slots):
+            raise DeviceError(
+                f"the bridge on '{self._params.device}' samples frames of {frame.rows} slots, and this kind of BioTac "
+                f'has {len(self._layout.slots)}; choose the sensor with the right one, or change the bridge'
+            )
+        missing = [finger for finger in self._prefixes if finger >= frame.columns]
         if missing:
             raise DeviceError(
                 f"finger {missing[0]} is requested, and the board at '{self._params.device}' has places 0 to "
-                f'{places - 1}; set the parameter finger to one of them'
+                f'{frame.columns - 1}; set the parameter finger to one of them'
+            )
+        self._places = frame.columns
+        return 1
+
+    def _batches(
+        self, stream: FramedStream, index: int, stamp_ns: int, data: bytes
+    ) -> Iterable[tuple[str, TactileSignal]]:
+        """Return the batches of PAC and of the slow channels of each finger that answered."""
+        replies = decode(data, self._layout, self._places)
+        frames = len(replies.slow)
+        self._unanswered += frames
+        for finger, prefix in self._prefixes.items():
+            self._damaged += int(replies.damaged[finger])
+            self._refused += int(replies.refused[finger])
+            if replies.damaged[finger] == frames * len(self._layout.slots):
+                continue  # no answer
+            self._answered, self._unanswered = self._answered + frames, 0
+            yield (
+                f'{prefix}signal',
+                TactileSignal(
+                    stamp_ns=stamp_ns + round(SLOT_NS),
+                    sensor=PAC_SENSOR,
+                    channels=(PAC,),
+                    units=(UNIT,),
+                    sampling_rate_hz=self._layout.pac_rate_hz,
+                    first_sample=index * self._layout.pac_per_frame,
+                    samples=replies.pac[:, finger : finger + 1],
+                    frame_id=self._params.frame_id,
+                ),
+            )
+            yield (
+                f'{prefix}signal_static',
+                TactileSignal(
+                    stamp_ns=stamp_ns,
+                    sensor=stream.sensor,
+                    channels=stream.channels,
+                    units=stream.units,
+                    sampling_rate_hz=stream.rate_hz,
+                    first_sample=index,
+                    samples=replies.slow[:, :, finger],
+                    frame_id=self._params.frame_id,
+                ),
             )
 
-    def _watch_silence(self, now_ns: int) -> None:
-        """Raise DeviceError when the board, or every requested finger, has been silent for a while."""
-        limit_ns = now_ns - SILENCE_S * NANOSECONDS
-        if self._last_received_ns[-1] < limit_ns:
-            raise DeviceError(
+    @property
+    def details(self) -> Mapping[str, str | float]:
+        """Serial number of each BioTac that reported it, and how much the device's clock is slow."""
+        serials = {f'serial of finger {place}': serial for place, serial in enumerate(self._serials) if serial}
+        return {**serials, **super().details}
+
+    def _open_port(self) -> Port:
+        return Cheetah(self._layout) if self._params.device == CHEETAH else super()._open_port()
+
+    def _silence_sentence(self) -> str:
+        if not self._unanswered:
+            return (
                 f"device '{self._params.device}' is open but sends no complete frames; check that it is a BioTac "
                 'bridge and runs, or replug it'
             )
-        if all(self._last_received_ns[finger] < limit_ns for finger in self._prefixes):
-            places = ' or '.join(str(finger) for finger in self._prefixes)
-            raise DeviceError(
-                f"no BioTac answers as finger {places} at '{self._params.device}'; "
-                'check its plug, and the parameter finger'
-            )
-
-
-def consecutive(frames: Sequence[SpiFrame]) -> Iterator[list[SpiFrame]]:
-    """Yield runs of frames that follow each other without a gap."""
-    numbered = enumerate(frames)
-    for _, run in groupby(numbered, key=lambda item: (item[1].epoch, item[1].fingers, item[1].number - item[0])):
-        yield [frame for _, frame in run]
+        places = ' or '.join(str(finger) for finger in self._prefixes)
+        return (
+            f"no BioTac answers as finger {places} at '{self._params.device}'; check its plug, and the parameter finger"
+        )

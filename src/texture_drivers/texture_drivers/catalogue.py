@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 
 from texture_core.types import Sensor
-from texture_drivers.anyskin import anyskin
+from texture_drivers.anyskin import AnySkin
 from texture_drivers.biotac import LAYOUTS as BIOTACS
 from texture_drivers.biotac import BioTac
 from texture_drivers.daq import daq
@@ -32,7 +32,7 @@ SENSORS: Mapping[str, MakeSensor] = {
     'biotac_hand': partial(BioTac, fingers=(0, 1, 2)),  # all places of a board; topics finger0/signal and so on
     'daq': daq,  # 4 PVDF films and 4 strain gauges at 2.5 kHz, Jamali & Sammut 2010
     'pvdf': pvdf,  # PVDF film and force sensor, Hu et al. 2014
-    'anyskin': anyskin,  # AnySkin and ReSkin: 5 magnetometers under a magnetic skin
+    'anyskin': AnySkin,  # AnySkin and ReSkin: 5 magnetometers under a magnetic skin
     'sound_card': SoundCard,  # contact microphone or accelerometer on a sound card
     'file': FilePlayer,  # a recording: CSV, WAV, NumPy
 }

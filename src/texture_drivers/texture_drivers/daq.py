@@ -13,7 +13,7 @@ import numpy as np
 from texture_core.config import from_mapping, param, safe_repr
 from texture_core.errors import InvalidParameter
 from texture_drivers.sensor import SensorParams, read_settings
-from texture_drivers.serial_line import FramedStream, SerialSensor, StreamDecoder, baud_param
+from texture_drivers.serial_line import FramedSensor, FramedStream, baud_param
 
 # --------------------
 # Numbers of the data acquisition finger.
@@ -57,11 +57,10 @@ class DaqSettings:
     )
 
 
-def daq(params: SensorParams, now_ns: Callable[[], int] = time.time_ns) -> SerialSensor:
+def daq(params: SensorParams, now_ns: Callable[[], int] = time.time_ns) -> FramedSensor:
     """Return the sensor; its settings are `config/sensors/daq.yaml` unless `params.config` names others."""
     settings, channels = load_daq(params.config or DEFAULT_SETTINGS)
-    decoder = StreamDecoder([stream(settings.rate_hz, channels)], params.frame_id)
-    return SerialSensor(params, now_ns, decoder, baud=settings.baud)
+    return FramedSensor(params, now_ns, [stream(settings.rate_hz, channels)], baud=settings.baud)
 
 
 def load_daq(config: str) -> tuple[DaqSettings, list[DaqChannel]]:

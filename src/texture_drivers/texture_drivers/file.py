@@ -212,17 +212,10 @@ class FileSettings:
     """How a recording is played; its path is the `device`."""
 
     rate_hz: float = param(
-        0.0,
-        'Sampling rate of every channel; 0 takes the rate that the file states.',
-        unit='Hz',
-        low=0.0,
-        high=1e6,
+        0.0, 'Sampling rate of every channel; 0 takes the rate that the file states.', unit='Hz', low=0.0, high=1e6
     )
     speed: float = param(
-        1.0,
-        'Playback rate relative to real time; 0: as fast as it can be read.',
-        low=0.0,
-        high=1000.0,
+        1.0, 'Playback rate relative to real time; 0: as fast as it can be read.', low=0.0, high=1000.0
     )
     loop: bool = param(False, 'Repeats the file from the beginning at its end.')
     topic: str = param('signal', 'Topic on which the samples are published.', choices=('signal', 'signal_static'))

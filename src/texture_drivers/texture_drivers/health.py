@@ -54,22 +54,16 @@ class Baseline:
 class Tare:
     """Collect the samples of a stream until its baseline is known."""
 
-    def __init__(self, duration_s: float, skip_s: float = 0.0) -> None:
+    def __init__(self, duration_s: float) -> None:
         self._duration_s = duration_s
-        self._skip_s = skip_s
         self._batches: list[TactileSignal] = []
-        self._begin_ns: int | None = None
 
     def add(self, batch: TactileSignal) -> Baseline | None:
         """Take a batch; return the baseline when the last one has come."""
-        if self._begin_ns is None:
-            self._begin_ns = batch.stamp_ns + round(self._skip_s * NANOSECONDS)
-        if batch.stamp_ns < self._begin_ns:
-            return None
         self._batches.append(batch)
-        if batch.end_ns < self._begin_ns + self._duration_s * NANOSECONDS:
-            return None
         first = self._batches[0]
+        if batch.end_ns < first.stamp_ns + self._duration_s * NANOSECONDS:
+            return None
         samples = np.concatenate([batch.samples for batch in self._batches]).astype(np.float64)
         if len(samples) < LEAST_SAMPLES or np.isnan(samples).all(axis=0).any():
             raise InvalidData(
@@ -117,22 +111,11 @@ Flags = NDArray[np.bool_]
 class TareParams:
     """How the level without load is measured and used."""
 
-    tare_s: float = param(
-        1.0,
-        "Averaging time of the service '~/tare'.",
-        unit='s',
-        low=0.1,
-        high=60.0,
-    )
+    tare_s: float = param(1.0, "Averaging time of the service '~/tare'.", unit='s', low=0.1, high=60.0)
     subtract_baseline: bool = param(
         False,
         'Subtracts the baseline from the published samples once the sensor has been tared; a model needs the setting '
         'of its training.',
-    )
-    auto_tare: bool = param(
-        False,
-        'Tares automatically while no exploration touches anything, at the start and whenever the level has drifted; '
-        "it needs the topic 'exploration'.",
     )
 
 
@@ -142,7 +125,6 @@ class StreamWatch:
     def __init__(self, limits: tuple[Any, Any] | None) -> None:
         self.baseline: Baseline | None = None
         self.drift = 0.0  # largest of all channels, in standard deviations of their noise
-        self.drifted = False
         self._limits = limits
         self._tare: Tare | None = None
         self._batches: list[TactileSignal] = []
@@ -155,22 +137,21 @@ class StreamWatch:
         """Whether a tare is in progress."""
         return self._tare is not None
 
-    def start_tare(self, tare: Tare | None) -> None:
-        """Tare from the next batch on; None gives up a tare."""
+    def start_tare(self, tare: Tare) -> None:
+        """Tare from the next batch on."""
         self._tare = tare
 
     def add(self, batch: TactileSignal) -> bool:
         """Take a batch; return whether it has completed a baseline. InvalidData if the tare is refused."""
         if len(self._batches) * len(batch.samples) < MOST_KEPT_S * batch.sampling_rate_hz:
             self._batches.append(batch)
-        tare, found = self._tare, None
-        if tare is not None:
-            self._tare = None  # unless it continues
-            found = tare.add(batch)
-            self._tare = None if found else tare
-        if found:
-            self.baseline, self.drifted, self.drift, self._drifts = found, False, 0.0, 0
-        return found is not None
+        tare, self._tare = self._tare, None  # unless it continues
+        found = tare.add(batch) if tare else None
+        if found is None:
+            self._tare = tare
+            return False
+        self.baseline, self.drift, self._drifts = found, 0.0, 0
+        return True
 
     def review(self, elapsed_s: float, unloaded: bool | None) -> list[str]:
         """Return sentences on what is wrong with the samples since the last review."""
@@ -203,8 +184,7 @@ class StreamWatch:
         drifts = self.baseline.drift(np.nanmean(samples, axis=0))
         self.drift = float(np.nanmax(drifts))
         self._drifts = self._drifts + 1 if self.drift > DRIFT_LIMIT else 0
-        self.drifted = self._drifts >= DRIFT_REVIEWS
-        if not self.drifted:
+        if self._drifts < DRIFT_REVIEWS:
             return []
         return _named(drifts > DRIFT_LIMIT, channels, 'has drifted off its baseline; tare again without load')
 
@@ -235,36 +215,22 @@ class ChannelWatch:
         self._lock = threading.Lock()
 
     @property
-    def needs_tare(self) -> bool:
-        """Whether an automatic tare is due: wanted, without load, and never done or drifted since."""
-        if not self._params.auto_tare or not self.unloaded or self.taring:
-            return False
-        return any(stream.baseline is None or stream.drifted for stream in self._streams.values())
-
-    @property
     def taring(self) -> bool:
         """Whether a tare is in progress."""
-        return any(stream.taring for stream in self._streams.values())
+        with self._lock:
+            return any(stream.taring for stream in self._streams.values())
 
     @property
     def baselines(self) -> Mapping[str, Baseline | None]:
         """The newest baseline by topic; None before the first tare."""
         return {topic: stream.baseline for topic, stream in self._streams.items()}
 
-    def start_tare(self, skip_s: float = 0.0) -> None:
-        """Measure the baseline of every stream from now on, after a while that is left out."""
+    def start_tare(self) -> None:
+        """Measure the baseline of every stream from now on."""
         with self._lock:
             self.refusal = ''
             for stream in self._streams.values():
-                stream.start_tare(Tare(self._params.tare_s, skip_s))
-
-    def set_unloaded(self, unloaded: bool) -> None:
-        """Take note of whether something touches the finger; a touch ends an automatic tare."""
-        with self._lock:
-            self.unloaded = unloaded
-            if self._params.auto_tare and not unloaded:
-                for stream in self._streams.values():
-                    stream.start_tare(None)
+                stream.start_tare(Tare(self._params.tare_s))
 
     def add(self, topic: str, batch: TactileSignal) -> tuple[TactileSignal, Baseline | None]:
         """Take a batch; return what is to be published of it, and the baseline if it has just become known."""
@@ -309,7 +275,7 @@ HealthReport = tuple[str, str, Mapping[str, Any]]
 # A restarted driver numbers from 0: what its stream lost before is unknown, above all at high rates.
 BEFORE_THE_START = {'lost before the start': 'unknown'}
 # A restarted bridge also numbers from 0: what was lost in between is estimated by time, to about a packet.
-INTERRUPTIONS = ('restarts', 'reopened')
+INTERRUPTIONS = ('device restarts', 'reopened')
 AT_INTERRUPTIONS = {'lost at restarts': 'estimated by time; less than a packet is unknown'}
 
 

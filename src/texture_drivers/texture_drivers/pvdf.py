@@ -12,7 +12,7 @@ import numpy as np
 
 from texture_core.config import param
 from texture_drivers.sensor import SensorParams, load_settings
-from texture_drivers.serial_line import FramedStream, SerialSensor, StreamDecoder, baud_param
+from texture_drivers.serial_line import FramedSensor, FramedStream, baud_param
 
 # --------------------
 # Numbers of the PVDF finger and of the line to its microcontroller.
@@ -50,11 +50,7 @@ class PvdfSettings:
 
     baud: int = baud_param(BAUD)
     film_gain_pc: float = param(FILM_PC_PER_COUNT, 'Charge of one count of the film.', unit='pC')
-    force_gain_n: float = param(
-        FORCE_N_PER_COUNT,
-        'Force of one count of the force sensor.',
-        unit='N',
-    )
+    force_gain_n: float = param(FORCE_N_PER_COUNT, 'Force of one count of the force sensor.', unit='N')
 
     def streams(self) -> list[FramedStream]:
         """Return what the device sends, as the line understands it."""
@@ -82,7 +78,7 @@ class PvdfSettings:
         ]
 
 
-def pvdf(params: SensorParams, now_ns: Callable[[], int] = time.time_ns) -> SerialSensor:
+def pvdf(params: SensorParams, now_ns: Callable[[], int] = time.time_ns) -> FramedSensor:
     """Return the sensor; `params.config` means `PvdfSettings`.
 
     Raises
@@ -91,4 +87,4 @@ def pvdf(params: SensorParams, now_ns: Callable[[], int] = time.time_ns) -> Seri
         If the settings are wrong.
     """
     settings = load_settings(PvdfSettings, params.config)
-    return SerialSensor(params, now_ns, StreamDecoder(settings.streams(), params.frame_id), baud=settings.baud)
+    return FramedSensor(params, now_ns, settings.streams(), baud=settings.baud)

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import threading
 import traceback
-from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,8 +24,7 @@ class BatchParams:
     """How the samples of a finger are delivered."""
 
     frame_id: str = param(
-        'fingertip',
-        'Frame of the fingertip in the published messages; in a namespace NAMESPACE/ is put before it.',
+        'fingertip', 'Frame of the fingertip in the published messages; in a namespace NAMESPACE/ is put before it.'
     )
     batch_s: float = param(
         0.01,
@@ -48,8 +46,7 @@ class SensorParams(BatchParams):
         "Path of the device; a symbolic link is followed at each opening. 'auto' finds the only TSF-85 on USB.",
     )
     config: str = param(
-        '',
-        "Settings of the sensor: path of a YAML file or name of one in config/sensors; '' takes the defaults.",
+        '', "Settings of the sensor: path of a YAML file or name of one in config/sensors; '' takes the defaults."
     )
 
 
@@ -61,7 +58,6 @@ RETRY_S = 0.2
 QUIET_ATTEMPTS = 25
 Deliver = Callable[[str, TactileSignal], None]
 LogSentence = Callable[[str], None]
-Action = Callable[[], None]
 T = TypeVar('T')
 
 
@@ -79,17 +75,12 @@ class SensorReader:
         self._deliver = deliver
         self._warn = warn
         self._inform = inform
-        self._actions: deque[Action] = deque()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name='sensor reader', daemon=True)
 
     def start(self) -> None:
         """Start the thread."""
         self._thread.start()
-
-    def between_reads(self, action: Action) -> None:
-        """Do something to the sensor in this thread, between two reads, once it is open; it may raise DeviceError."""
-        self._actions.append(action)
 
     def stop(self) -> None:
         """End the thread and close the sensor; returns when both are done."""
@@ -110,8 +101,6 @@ class SensorReader:
             while not self._stop.is_set():
                 for topic, batches in self._of_sensor(self.sensor.read).items():
                     self._deliver_all(topic, batches)
-                while self._actions:
-                    self._actions.popleft()()
         except DeviceError as error:
             self.fault = str(error)
             self._warn_once(self.fault)

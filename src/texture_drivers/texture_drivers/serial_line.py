@@ -10,9 +10,8 @@ import termios
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import serial
@@ -25,7 +24,7 @@ from texture_core.framing import TIME_BITS, CounterUnwrapper, Frame, FrameDecode
 from texture_core.types import NANOSECONDS, Array, TactileSignal
 from texture_drivers.health import Limits
 from texture_drivers.sensor import SensorParams
-from texture_drivers.timing import PPM, SLOW_CLOCK, BlockCounter, StreamClock
+from texture_drivers.timing import PPM, SLOW_CLOCK, StreamClock
 
 # --------------------
 # A stream of a framed protocol, as a sensor declares it.
@@ -46,6 +45,7 @@ class FramedStream:
     units: tuple[str, ...]
     gains: Array
     offsets: Array
+    sample_s: float = 0.0  # that it takes to take a sample
 
     def __post_init__(self) -> None:
         if not len(self.channels) == len(self.units) == len(self.gains) == len(self.offsets) > 0:
@@ -81,6 +81,19 @@ def baud_param(default: int) -> Any:
     )
 
 
+class Port(Protocol):
+    """What a sensor reads its bytes from, opened by its constructor; a fault is a DeviceError."""
+
+    def read(self, wait_s: float) -> bytes:
+        """Wait, and return what has arrived."""
+
+    def write(self, data: bytes) -> None:
+        """Send."""
+
+    def close(self) -> None:
+        """Close; never raises."""
+
+
 class SerialPort:
     """An exclusively opened serial device in raw mode."""
 
@@ -101,8 +114,9 @@ class SerialPort:
         except OSError:  # a pseudo-terminal: ENOTTY
             return False
 
-    def read(self) -> bytes:
-        """Return what has arrived, without waiting."""
+    def read(self, wait_s: float) -> bytes:
+        """Wait, and return what has arrived."""
+        time.sleep(wait_s)
         data = b''
         with self._faults():
             # The kernel returns 4 kB at once and holds more; what comes meanwhile is read next time.
@@ -138,56 +152,18 @@ def reason_of(error: Exception) -> str:
 
 
 # --------------------
-# A sensor that streams samples over a serial port, whatever its protocol: a decoder turns the bytes into batches.
+# A sensor that streams samples over a serial port, whatever its protocol.
 
 SILENCE_S = 1.0  # the device sends unrequested; opening the port again often restarts it
 
 
-class Decoder:
-    """Turns the bytes of one protocol into batches; independent of port and clock."""
-
-    @property
-    def valid_frames(self) -> int:
-        """How many valid frames have come in all."""
-        raise NotImplementedError
-
-    @property
-    def counts(self) -> Mapping[str, int]:
-        """Running totals, 'samples', 'lost' and 'bogus' among them."""
-        raise NotImplementedError
-
-    @property
-    def details(self) -> Mapping[str, float]:
-        """What the device's stream shows in addition to the samples, by name."""
-        raise NotImplementedError
-
-    @property
-    def rates_hz(self) -> Mapping[str, float]:
-        """Nominal rate of each topic."""
-        raise NotImplementedError
-
-    @property
-    def limits(self) -> Limits:
-        """Lowest and highest sample by topic, where they are known."""
-        return {}
-
-    def restart(self) -> None:
-        """Resume after an interruption."""
-        raise NotImplementedError
-
-    def feed(self, data: bytes, arrival_ns: int) -> Mapping[str, Sequence[TactileSignal]]:
-        """Return the batches, by topic, in `data`, which has just arrived."""
-        raise NotImplementedError
-
-
 class SerialSensor:
-    """Read the streams of one device. See `texture_core.types.Sensor`."""
+    """Read the streams of one device. See `texture_core.types.Sensor`; each kind turns the bytes into batches."""
 
     def __init__(
         self,
         params: SensorParams,
         now_ns: Callable[[], int],
-        decoder: Decoder,
         *,
         baud: int = 115200,
         start_command: bytes = b'',
@@ -195,23 +171,25 @@ class SerialSensor:
     ) -> None:
         self._params = params
         self._now_ns = now_ns
-        self._decoder = decoder
         self._baud = baud
         self._start_command = start_command
         self._stop_command = stop_command
         self._path = params.device
-        self._port: SerialPort | None = None
+        self._port: Port | None = None
         self._opened = 0
         self._silent_s, self._babbles = 0.0, False
 
     def open(self) -> None:
         """Open the device and start its stream; DeviceError if it cannot be reached."""
         self.close()
-        self._port = SerialPort(self._path, self._baud)
+        self._port = self._open_port()
         self.send(self._start_command)
         self._opened += 1
         self._silent_s, self._babbles = 0.0, False
-        self._decoder.restart()
+        self.restart()
+
+    def _open_port(self) -> Port:
+        return SerialPort(self._path, self._baud)
 
     def send(self, command: bytes) -> None:
         """Send a command; b'' sends nothing."""
@@ -221,13 +199,11 @@ class SerialSensor:
 
     def read(self) -> Mapping[str, Sequence[TactileSignal]]:
         """Wait for the length of one batch and return what arrived."""
-        port = self._opened_port()
-        time.sleep(self._params.batch_s)
-        data = port.read()
+        data = self._opened_port().read(self._params.batch_s)
         arrival_ns = self._now_ns()
-        frames = self._decoder.valid_frames
-        batches = self._decoder.feed(data, arrival_ns)
-        alive = self._decoder.valid_frames > frames
+        frames = self.valid_frames
+        batches = self.feed(data, arrival_ns)
+        alive = self.valid_frames > frames
         self._silent_s = 0.0 if alive else self._silent_s + self._params.batch_s
         self._babbles = not alive and (self._babbles or bool(data))  # since the last valid frame, not in the last read
         self._act_on_silence()
@@ -243,38 +219,53 @@ class SerialSensor:
         self._port = None
 
     @property
+    def valid_frames(self) -> int:
+        """How many valid frames have come in all."""
+        raise NotImplementedError
+
+    def restart(self) -> None:
+        """Resume after an interruption, with the index according to the host's clock."""
+        raise NotImplementedError
+
+    def feed(self, data: bytes, arrival_ns: int) -> Mapping[str, Sequence[TactileSignal]]:
+        """Return the batches, by topic, in `data`, which has just arrived; none in the first 0.1 s of a stream."""
+        raise NotImplementedError
+
+    @property
     def counts(self) -> Mapping[str, int]:
-        """Totals of the decoder, and how often the device was opened again."""
-        return {**self._decoder.counts, 'reopened': max(0, self._opened - 1)}
+        """How often the device was opened again; each kind adds its totals, such as 'samples', 'lost', 'bogus'."""
+        return {'reopened': max(0, self._opened - 1)}
 
     @property
     def details(self) -> Mapping[str, str | float]:
-        """What the decoder reports in addition to the samples, such as the drift of the device's clock."""
-        return self._decoder.details
+        """What the stream shows in addition to the samples, such as the drift of the device's clock."""
+        return {}
 
     @property
     def expected_rates_hz(self) -> Mapping[str, float]:
         """Nominal rate of each topic."""
-        return self._decoder.rates_hz
+        raise NotImplementedError
 
     @property
     def limits(self) -> Limits:
         """Lowest and highest sample by topic, where they are known."""
-        return self._decoder.limits
+        return {}
 
-    def _opened_port(self) -> SerialPort:
+    def _opened_port(self) -> Port:
         if self._port is None:
             raise DeviceError(f"device '{self._params.device}' is not open; open it before reading")
         return self._port
 
     def _act_on_silence(self) -> None:
         """Raise DeviceError when the device has been silent for too long."""
-        if self._silent_s < SILENCE_S:
-            return
+        if self._silent_s >= SILENCE_S:
+            raise DeviceError(self._silence_sentence())
+
+    def _silence_sentence(self) -> str:
         what, check = 'nothing', 'that its firmware runs'
         if self._babbles:
             what, check = 'bytes but no valid frame', f'its baud rate ({self._baud} is set)'
-        raise DeviceError(
+        return (
             f"device '{self._params.device}' is open and sends {what}; check that it is the right device, and {check}"
         )
 
@@ -294,62 +285,99 @@ class StreamBlock(NamedTuple):
     data: bytes
 
 
-class StreamTracker:
-    """Follow one stream: number its blocks and make batches of them."""
+RATE_CHECK_S = 1.0
+MAX_FAILED_CHECKS = 3  # consecutive failures that are no transient
+RATE_TOLERANCE = 0.02  # far more than clocks differ, far less than a wrong setting
 
-    def __init__(self, stream: FramedStream, frame_id: str) -> None:
+
+class StreamTracker:
+    """Follow one stream: number its blocks so that a jump is exactly what was lost, and join those without a gap.
+
+    The device's time shows how many samples are missing, wherever they were lost: lost frames of the line show in their
+    numbers, what is missing beyond them was left out by the device itself and counts as `overrun`.
+    """
+
+    def __init__(self, stream: FramedStream) -> None:
         self.stream = stream
         self.samples = 0  # published
         self.lost = 0  # between the first one published and the last
-        self._signal = partial(
-            TactileSignal, sensor=stream.sensor, channels=stream.channels, units=stream.units,
-            sampling_rate_hz=stream.rate_hz, frame_id=frame_id,
-        )  # fmt: skip
-        self._counter = BlockCounter(stream.rate_hz, stream.sensor)
+        self.overrun = 0  # samples that the device itself left out
+        self._next_index = 0
+        self._next_us: float | None = None  # when the next sample is due by the device's clock
         self._due_ns: int | None = None  # when the next sample would have come, had there been no interruption
+        self._carried = 0.0  # lost in interruptions and not counted yet: less than a sample; below 0: counted too many
         self._published: int | None = None  # index after the last one
-
-    @property
-    def overrun(self) -> int:
-        """Samples that the device itself left out."""
-        return self._counter.overrun
+        self._restart_check()
 
     def end_us(self, block: StreamBlock) -> int:
-        """Return the device's time of a block's last sample."""
-        return block.time_us + round((block.rows - 1) * MICROSECONDS / self.stream.rate_hz)
+        """Return the device's time at the end of a block's last sample."""
+        return block.time_us + round(((block.rows - 1) / self.stream.rate_hz + self.stream.sample_s) * MICROSECONDS)
 
     def interrupt(self, clock: StreamClock) -> None:
         """Note by the old clock when the next sample is due."""
-        if self._counter.next_us is not None and clock.settled:
-            self._due_ns = clock.time_ns(self._counter.next_us)
-        self._counter.resume(0)
+        if self._next_us is not None and clock.settled:
+            self._due_ns = clock.time_ns(self._next_us)
+        self._next_us = None
+        self._restart_check()
 
-    def batches(self, blocks: Sequence[StreamBlock], clock: StreamClock) -> list[TactileSignal]:
-        """Return the batches that consecutive blocks make: a new one wherever samples are missing."""
+    def place(self, time_us: int, rows: int, lost_frames: int) -> int:
+        """Return the index of a block's first sample."""
+        skipped = 0
+        if self._next_us is not None:
+            skipped = max(0, round((time_us - self._next_us) * self.stream.rate_hz / MICROSECONDS))
+        self.overrun += max(0, skipped - lost_frames * rows)
+        self._check_rate(time_us, rows, lost_frames)
+        index = self._next_index + skipped
+        self._next_index = index + rows
+        self._next_us = time_us + rows * MICROSECONDS / self.stream.rate_hz
+        return index
+
+    def runs(self, blocks: Sequence[StreamBlock], clock: StreamClock) -> list[tuple[int, int, bytes]]:
+        """Return index, stamp in ns and bytes of the samples of consecutive blocks: a new run wherever some miss."""
         if self._due_ns is not None:
-            missing_ns = clock.time_ns(blocks[0].time_us) - self._due_ns
-            self._counter.resume(max(0, round(missing_ns * self.stream.rate_hz / NANOSECONDS)))
-            self._due_ns = None
+            late_ns = max(0.0, clock.time_ns(blocks[0].time_us) - self._due_ns)
+            missing = self._carried + late_ns * self.stream.rate_hz / NANOSECONDS
+            self._next_index += max(0, round(missing))
+            self._carried, self._due_ns = missing - max(0, round(missing)), None
         runs: list[tuple[int, int, list[bytes]]] = []
         for block in blocks:
-            expected = self._counter.next_index
-            index = self._counter.place(block.time_us, block.rows, block.lost_frames)
+            expected = self._next_index
+            index = self.place(block.time_us, block.rows, block.lost_frames)
+            self.lost += 0 if self._published is None else index - self._published
+            self._published = index + block.rows
+            self.samples += block.rows
             if not runs or index != expected:
                 runs.append((index, block.time_us, []))
             runs[-1][2].append(block.data)
-        return [self._batch(index, clock.time_ns(time_us), b''.join(data)) for index, time_us, data in runs]
+        return [(index, clock.time_ns(time_us), b''.join(data)) for index, time_us, data in runs]
 
-    def _batch(self, index: int, stamp_ns: int, data: bytes) -> TactileSignal:
-        counts: NDArray[np.int16] = np.frombuffer(data, dtype=SAMPLE).reshape(-1, len(self.stream.channels))
-        self.lost += 0 if self._published is None else index - self._published
-        self._published = index + len(counts)
-        self.samples += len(counts)
-        samples = (counts * self.stream.gains + self.stream.offsets).astype(np.float32)
-        return self._signal(stamp_ns=stamp_ns, first_sample=index, samples=samples)
+    def _restart_check(self) -> None:
+        self._since_us: int | None = None
+        self._rows = 0
+        self._failed_checks = 0
+
+    def _check_rate(self, time_us: int, rows: int, lost_frames: int) -> None:
+        """Compare rows with time over stretches in which no frame was lost."""
+        if lost_frames or self._since_us is None:
+            self._since_us, self._rows = time_us, rows
+            return
+        elapsed_s = (time_us - self._since_us) / MICROSECONDS
+        if elapsed_s >= RATE_CHECK_S:
+            rate_hz = self._rows / elapsed_s
+            off = abs(rate_hz / self.stream.rate_hz - 1) > RATE_TOLERANCE
+            self._failed_checks = self._failed_checks + 1 if off else 0
+            if self._failed_checks == MAX_FAILED_CHECKS:
+                raise DeviceError(
+                    f"'{self.stream.sensor}' delivers {rate_hz:.4g} samples in a second of the device's clock, and "
+                    f'{self.stream.rate_hz:.4g} are set; correct the rate in the settings, or lighten the load of the '
+                    'device'
+                )
+            self._since_us, self._rows = time_us, 0
+        self._rows += rows
 
 
 # --------------------
-# Streams of samples on a framed serial line: numbered, timed, in physical units. Independent of the port.
+# Streams of samples on a framed serial line: numbered, timed, in physical units.
 #
 # Each frame (see `texture_core.framing`) carries `rows` consecutive samples of `columns` channels as int16, little
 # endian, row after row; its kind identifies the stream, its time is that of the first row.
@@ -357,19 +385,28 @@ class StreamTracker:
 LONGEST_STEP_US = 10 * MICROSECONDS  # a clock that jumps further is another one; the host's clock gives the gap
 
 
-class StreamDecoder(Decoder):
-    """Decode the bytes of a framed serial line into the batches of its streams, by topic.
+class FramedSensor(SerialSensor):
+    """Read the streams of a framed serial line, all timed by one clock.
 
-    Frames of other kinds are passed over, so that other traffic may share the line. All streams are timed by one clock.
+    Frames of other kinds are passed over, so that other traffic may share the line.
     """
 
-    def __init__(self, streams: Sequence[FramedStream], frame_id: str = '') -> None:
+    def __init__(
+        self,
+        params: SensorParams,
+        now_ns: Callable[[], int],
+        streams: Sequence[FramedStream],
+        *,
+        baud: int = 115200,
+        max_drift: float = 5e-3,
+    ) -> None:
+        super().__init__(params, now_ns, baud=baud)
         self.malformed = 0  # frames that passed the checksum and hold another number of bytes than declared
         self.other_frames = 0  # frames of other kinds
         self.restarts = 0  # of the device's clock
         self.deframer = FrameDecoder()
-        self.clock = StreamClock(MICROSECONDS)
-        self.trackers = {stream.kind: StreamTracker(stream, frame_id) for stream in streams}
+        self.clock = StreamClock(MICROSECONDS, max_drift=max_drift)
+        self.trackers = {stream.kind: StreamTracker(stream) for stream in streams}
         self._time = CounterUnwrapper(TIME_BITS)
         self._latest_us: dict[int, int] = {}  # time of the last block of each kind
         self._newest_us = 0
@@ -392,15 +429,16 @@ class StreamDecoder(Decoder):
             'other frames': self.other_frames,
             'device restarts': self.restarts,
             'clock_steps': self.clock.steps,
+            **super().counts,
         }
 
     @property
-    def details(self) -> Mapping[str, float]:
+    def details(self) -> Mapping[str, str | float]:
         """How much the device's clock is slow."""
         return {SLOW_CLOCK: PPM * self.clock.drift}
 
     @property
-    def rates_hz(self) -> Mapping[str, float]:
+    def expected_rates_hz(self) -> Mapping[str, float]:
         """Nominal rate of each topic."""
         return {tracker.stream.topic: tracker.stream.rate_hz for tracker in self.trackers.values()}
 
@@ -425,10 +463,30 @@ class StreamDecoder(Decoder):
             self._newest_us = newest_us
         if not self.clock.settled:
             return {}
-        return {
-            self.trackers[kind].stream.topic: self.trackers[kind].batches(found, self.clock)
-            for kind, found in blocks.items()
-        }
+        topics: dict[str, list[TactileSignal]] = {}
+        for kind, found in blocks.items():
+            for run in self.trackers[kind].runs(found, self.clock):
+                for topic, batch in self._batches(self.trackers[kind].stream, *run):
+                    topics.setdefault(topic, []).append(batch)
+        return topics
+
+    def _batches(
+        self, stream: FramedStream, index: int, stamp_ns: int, data: bytes
+    ) -> Iterable[tuple[str, TactileSignal]]:
+        """Return topic and batch of consecutive samples."""
+        counts: NDArray[np.int16] = np.frombuffer(data, dtype=SAMPLE).reshape(-1, len(stream.channels))
+        samples = (counts * stream.gains + stream.offsets).astype(np.float32)
+        batch = TactileSignal(
+            stamp_ns,
+            stream.sensor,
+            stream.channels,
+            stream.units,
+            stream.rate_hz,
+            index,
+            samples,
+            self._params.frame_id,
+        )
+        return [(stream.topic, batch)]
 
     def _restart_streams(self) -> None:
         for tracker in self.trackers.values():
@@ -442,14 +500,15 @@ class StreamDecoder(Decoder):
         """Return the blocks of each stream; those before a restart of the device's clock are dropped."""
         blocks: dict[int, list[StreamBlock]] = {}
         for frame in frames:
-            if not self._fits(frame):
+            rows = self._rows(frame)
+            if not rows:
                 continue
             if self._has_restarted(frame):
                 self.restarts += 1
                 self._restart_streams()
                 blocks = {}
             time_us = self._latest_us[frame.kind] = self._time.advance(frame.time_us)
-            blocks.setdefault(frame.kind, []).append(StreamBlock(time_us, frame.rows, frame.lost, frame.body))
+            blocks.setdefault(frame.kind, []).append(StreamBlock(time_us, rows, frame.lost, frame.body))
         return blocks
 
     def _has_restarted(self, frame: Frame) -> bool:
@@ -460,26 +519,29 @@ class StreamDecoder(Decoder):
         moved_back = self._time.value + step_us < self._latest_us.get(frame.kind, self._time.value + step_us)
         return moved_back or abs(step_us) > LONGEST_STEP_US
 
-    def _fits(self, frame: Frame) -> bool:
+    def _rows(self, frame: Frame) -> int:
+        """Return how many samples a frame holds; 0 if it is passed over."""
         tracker = self.trackers.get(frame.kind)
         if tracker is None:
             self.other_frames += 1
-            return False
-        stream = tracker.stream
+            return 0
         if frame.version != VERSION:
             raise DeviceError(
-                f"'{stream.sensor}' sends frames of version {frame.version}, and {VERSION} is known; update the device "
-                'or this driver'
+                f"'{tracker.stream.sensor}' sends frames of version {frame.version}, and {VERSION} is known; update "
+                'the device or this driver'
             )
+        rows = self._rows_of(tracker.stream, frame)
+        self.malformed += not rows
+        return rows
+
+    def _rows_of(self, stream: FramedStream, frame: Frame) -> int:
+        """Return how many samples a frame of a stream holds; 0 if it contradicts itself."""
         if frame.columns != len(stream.channels):
             raise DeviceError(
                 f"'{stream.sensor}' sends {frame.columns} channels, and {len(stream.channels)} are named "
                 f'{list(stream.channels)}; correct the channels in the settings'
             )
-        if not frame.rows or frame.rows * frame.columns * SAMPLE.itemsize != len(frame.body):
-            self.malformed += 1
-            return False
-        return True
+        return frame.rows if len(frame.body) == frame.rows * frame.columns * SAMPLE.itemsize else 0
 
 
 # --------------------

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from texture_core.errors import DeviceError
 from texture_core.types import NANOSECONDS, Array
 
 # --------------------
@@ -137,7 +136,10 @@ class StreamClock:
             self._origin = (index, arrival_ns)
         arrival = self._arrival(index, arrival_ns)
         if self._has_stepped(index, arrival, arrival_ns):
-            self._follow_step((index, arrival_ns))
+            # The host's clock was set to another time: begin there.
+            self.steps += 1
+            self.restart()
+            self._origin, self.settled = (index, arrival_ns), True
             arrival = Arrival(0.0, 0.0)
         self._last_index = index
         self._store(arrival)
@@ -159,13 +161,6 @@ class StreamClock:
         elapsed_ns = (reached_ns - self._now.offset_ns) / (1 + self._now.drift)
         remaining_ns = self._now.delay_ns_at(elapsed_ns, self._slew_rate) - self._now.trend_ns(elapsed_ns)
         return first_index + (elapsed_ns - remaining_ns) / self._period_ns
-
-    def _follow_step(self, origin: tuple[int, int]) -> None:
-        """Restart where the host's clock was set to another time."""
-        self.steps += 1
-        self.restart()
-        self._origin = origin
-        self.settled = True
 
     def _arrival(self, index: int, arrival_ns: int) -> Arrival:
         first_index, first_ns = self._origin or (index, arrival_ns)
@@ -349,118 +344,6 @@ class SampleCounter:
         if last < SHORT_COUNTER and ticks < -SHORT_COUNTER // 2:  # 16 bits have wrapped
             ticks += SHORT_COUNTER
         return round(ticks / (self.ticks or 1))
-
-
-# --------------------
-# Give packets that carry their number its running index.
-
-
-class PacketNumbering:
-    """Give each packet its index: a jump is what was lost, over an interruption by the time that passed.
-
-    A stream that begins again need not begin on the beat of packets: what is less than a packet is carried on to the
-    next interruption, so that many of them do not add up to an uncounted loss.
-    """
-
-    def __init__(self, rate_hz: float) -> None:
-        self.lost = 0
-        self._rate_hz = rate_hz
-        self._next_index = 0
-        self._next_ns: int | None = None  # when the next packet should start
-        self._next_number: int | None = None  # none after an interruption
-        self._carried = 0.0  # packets lost in interruptions and not counted yet; below 0: counted too many
-
-    def interrupt(self) -> None:
-        """Forget the device's numbers: they begin again."""
-        self._next_number = None
-
-    def place(self, number: int, count: int, start_ns: int) -> int:
-        """Return the index of the first of `count` packets that follow each other."""
-        skipped = 0
-        if self._next_number is not None:
-            skipped = number - self._next_number
-        elif self._next_ns is not None:
-            missing = self._carried + max(0.0, (start_ns - self._next_ns) / NANOSECONDS * self._rate_hz)
-            skipped = round(missing)
-            self._carried = missing - skipped
-        self.lost += skipped
-        index = self._next_index + skipped
-        self._next_index = index + count
-        self._next_number = number + count
-        self._next_ns = start_ns + round(count / self._rate_hz * NANOSECONDS)
-        return index
-
-
-# --------------------
-# Give blocks of samples their running index, so that a jump of the index is exactly what was lost.
-
-RATE_CHECK_S = 1.0
-MAX_FAILED_CHECKS = 3  # consecutive failures that are no transient
-RATE_TOLERANCE = 0.02  # far more than clocks differ, far less than a wrong setting
-
-
-class BlockCounter:
-    """Count samples by the device's time of each block, cross-checked with the numbers of the frames they came in.
-
-    The time shows how many samples are missing, wherever they were lost: lost frames of the line show in their numbers,
-    what is missing beyond them was left out by the device itself and counts as `overrun`.
-    """
-
-    def __init__(self, rate_hz: float, name: str) -> None:
-        self.next_index = 0
-        self.overrun = 0  # samples that the device itself left out
-        self._rate_hz = rate_hz
-        self._name = name
-        self._next_us: float | None = None
-        self._restart_check()
-
-    @property
-    def next_us(self) -> float | None:
-        """When the next sample is due by the device's clock; None before the first block."""
-        return self._next_us
-
-    def resume(self, missing: int) -> None:
-        """Resume after an interruption with another time; `missing` samples are lost."""
-        self.next_index += missing
-        self._next_us = None
-        self._restart_check()
-
-    def place(self, time_us: int, rows: int, lost_frames: int) -> int:
-        """Return the index of a block's first sample."""
-        skipped = 0
-        if self._next_us is not None:
-            skipped = max(0, round((time_us - self._next_us) * self._rate_hz / 1e6))
-        self.overrun += max(0, skipped - lost_frames * rows)
-        self._check_rate(time_us, rows, lost_frames)
-        index = self.next_index + skipped
-        self.next_index = index + rows
-        self._next_us = time_us + rows * 1e6 / self._rate_hz
-        return index
-
-    def _restart_check(self) -> None:
-        self._since_us: int | None = None
-        self._rows = 0
-        self._failed_checks = 0
-
-    def _check_rate(self, time_us: int, rows: int, lost_frames: int) -> None:
-        """Compare rows with time over stretches in which no frame was lost."""
-        if lost_frames or self._since_us is None:
-            self._since_us, self._rows = time_us, rows
-            return
-        elapsed_s = (time_us - self._since_us) / 1e6
-        if elapsed_s >= RATE_CHECK_S:
-            self._check_rate_deviation(self._rows / elapsed_s)
-            self._since_us, self._rows = time_us, 0
-        self._rows += rows
-
-    def _check_rate_deviation(self, rate_hz: float) -> None:
-        off = abs(rate_hz / self._rate_hz - 1) > RATE_TOLERANCE
-        self._failed_checks = self._failed_checks + 1 if off else 0
-        if self._failed_checks == MAX_FAILED_CHECKS:
-            raise DeviceError(
-                f"'{self._name}' delivers {rate_hz:.4g} samples in a second of the device's clock, and "
-                f'{self._rate_hz:.4g} are set; correct the rate in the settings, or lighten the load of the device'
-            )
 
 
 # --------------------

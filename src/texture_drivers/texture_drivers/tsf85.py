@@ -17,12 +17,12 @@ import numpy as np
 
 from texture_core.config import param
 from texture_core.errors import DeviceError, InvalidParameter
-from texture_core.types import Array, TactileSignal
+from texture_core.types import TactileSignal
 from texture_drivers import serial_line
 from texture_drivers.health import Limits
 from texture_drivers.sensor import SensorParams, load_settings
-from texture_drivers.serial_line import Decoder, SerialSensor
-from texture_drivers.timing import BLOCKS_LATE, PPM, SLOW_CLOCK, ArrivalNumbering, SampleCounter, StreamClock
+from texture_drivers.serial_line import SerialSensor
+from texture_drivers.timing import BLOCKS_LATE, PPM, SLOW_CLOCK, ArrivalNumbering, SampleCounter
 
 # --------------------
 # Numbers of the TSF-85's protocol and streams.
@@ -90,8 +90,6 @@ LAYOUTS: Mapping[str, Tsf85Layout] = {
     'tsf85_3x4': Tsf85Layout(3, 4, 25.0),
 }
 TSF85 = LAYOUTS['tsf85']
-STATIC_CHANNELS = TSF85.static_channels
-TAXELS = len(STATIC_CHANNELS)
 
 USB_IDS = ((0x16D0, 0x14CC), (0x04B4, 0xF232))  # the present one; an older one, Cypress' default
 
@@ -125,7 +123,6 @@ class Tsf85Parser:
     """
 
     def __init__(self, layout: Tsf85Layout = TSF85) -> None:
-        self.packets = 0
         self.refused = 0  # start bytes that led to no packet
         self.refused_bytes = 0
         self._items = layout.items
@@ -155,7 +152,6 @@ class Tsf85Parser:
                 packets.append(packet)
                 position = _end(buffer, start)
         self._buffer = buffer[position:]
-        self.packets += len(packets)
         return packets
 
 
@@ -208,6 +204,11 @@ def _parse_items(payload: bytes, timestamp: Struct, layouts: Mapping[int, Struct
 # --------------------
 # Sample frames of one finger, one a millisecond, from packets that may hold any of its measurements.
 
+MOTION_KINDS = (ACCELEROMETER, GYROSCOPE)  # of the inertial sensors, three numbers each; few devices send a field
+MOTION_CHANNELS = tuple(f'{quantity}_{axis}' for quantity in ('acceleration', 'rotation') for axis in 'xyz')
+MOTION_UNITS = ('m/s²',) * 3 + ('rad/s',) * 3
+# Counts of 1 g and of 1 degree a second, of the vendor's viewer: 2 g and 250 degrees a second are full scale.
+MOTION_GAINS = np.repeat([9.80665 / 16384.0, math.radians(1.0) / 131.072], 3)
 MOTION_HOLD = 10  # sets; firmware that sends what is new may be a set late with it, not more
 UNKNOWN = (float('nan'),) * 3
 
@@ -224,11 +225,11 @@ class SampleFrame(NamedTuple):
 class SampleFrameSplitter:
     """Turn packets into the sample frames of one finger: a dynamic item starts a frame and takes what came before."""
 
-    def __init__(self, finger: int, motion_kinds: Sequence[int] = ()) -> None:
+    def __init__(self, finger: int) -> None:
         self._finger = finger
         self._image: tuple[int, ...] | None = None
-        self._motion: dict[int, tuple[float, ...]] = dict.fromkeys(motion_kinds, UNKNOWN)
-        self._ages = dict.fromkeys(motion_kinds, 0)
+        self._motion: dict[int, tuple[float, ...]] = dict.fromkeys(MOTION_KINDS, UNKNOWN)
+        self._ages = dict.fromkeys(MOTION_KINDS, 0)
 
     def frames(self, packets: Sequence[Packet]) -> list[SampleFrame]:
         """Return the sets in a row of packets."""
@@ -266,185 +267,50 @@ class SampleFrameSplitter:
 
 
 # --------------------
-# Settings of the TSF-85 in addition to those of every sensor: its inertial sensors.
-
-STANDARD_GRAVITY_M_S2 = 9.80665
-TESLA_PER_UT = 1e-6
-SETTINGS_AXES = 'xyz'
-
-
-@dataclass(frozen=True)
-class Tsf85Settings:
-    """Whether and how the inertial sensors of the finger are published, as topic 'signal_imu'."""
-
-    imu: bool = param(True, "Publishes acceleration and angular rate on the topic 'signal_imu'.")
-    magnetometer: bool = param(False, 'Also publishes the magnetic field, which few firmware versions send.')
-    # Of the vendor's viewer: 2 g and 250 degrees a second are full scale.
-    acceleration_count_g: float = param(
-        16384.0,
-        'Accelerometer counts of one g.',
-        unit='1/g',
-        low=1.0,
-        high=1e6,
-    )
-    rotation_count_dps: float = param(
-        131.072,
-        'Gyroscope counts of one degree per second.',
-        unit='s/deg',
-        low=1e-3,
-        high=1e6,
-    )
-    # Data sheet of the ICM-20948: 0.15 microtesla a count.
-    field_count_ut: float = param(
-        1 / 0.15,
-        'Magnetometer counts of one microtesla.',
-        unit='1/µT',
-        low=1e-3,
-        high=1e6,
-    )
-
-    @property
-    def kinds(self) -> tuple[int, ...]:
-        """Kinds of items that are published, three numbers each."""
-        wanted = {ACCELEROMETER: self.imu, GYROSCOPE: self.imu, MAGNETOMETER: self.magnetometer}
-        return tuple(kind for kind, is_wanted in wanted.items() if is_wanted)
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """Name of each column."""
-        return tuple(f'{QUANTITIES[kind][0]}_{axis}' for kind in self.kinds for axis in SETTINGS_AXES)
-
-    @property
-    def units(self) -> tuple[str, ...]:
-        """Unit of each column."""
-        return tuple(QUANTITIES[kind][1] for kind in self.kinds for _ in SETTINGS_AXES)
-
-    @property
-    def gains(self) -> Array:
-        """Unit per count of each column, (n_columns,)."""
-        gains = {
-            ACCELEROMETER: STANDARD_GRAVITY_M_S2 / self.acceleration_count_g,
-            GYROSCOPE: math.radians(1.0) / self.rotation_count_dps,
-            MAGNETOMETER: TESLA_PER_UT / self.field_count_ut,
-        }
-        return np.repeat([gains[kind] for kind in self.kinds], len(SETTINGS_AXES))
-
-
-QUANTITIES = {ACCELEROMETER: ('acceleration', 'm/s²'), GYROSCOPE: ('rotation', 'rad/s'), MAGNETOMETER: ('field', 'T')}
-
-
-# --------------------
-# Cut the samples of a finger into batches of signals.
+# One finger of a TSF-85: its sample frames become numbered, timed batches of signals.
 
 IMAGE_HOLD_S = 0.25  # an image older than this is no measurement of now
-SIGNAL, BATCH_STATIC, IMU = 'signal', 'signal_static', 'signal_imu'
-
-
-class BatchCutter:
-    """Batch numbered sample frames: a new batch wherever the index jumps, and taxel images at a constant rate."""
-
-    def __init__(self, layout: Tsf85Layout, settings: Tsf85Settings, frame_id: str, clock: StreamClock) -> None:
-        self.samples = 0
-        self.lost = 0
-        self.images = 0
-        self.repeated_images = 0  # published although no other image had come since the tick before
-        self.static_rate_hz = static_rate_hz = layout.static_rate_hz
-        self._clock = clock
-        self._motion_gains: Array = settings.gains
-        signal = partial(TactileSignal, frame_id=frame_id)
-        taxels, fast = layout.static_channels, {'sampling_rate_hz': RATE_HZ}
-        self._dynamic = partial(signal, sensor=DYNAMIC_SENSOR, channels=DYNAMIC_CHANNELS, units=(UNIT,), **fast)
-        self._motion = partial(signal, sensor=MOTION_SENSOR, channels=settings.channels, units=settings.units, **fast)
-        self._static = partial(
-            signal, sensor=STATIC_SENSOR, channels=taxels, units=(UNIT,) * len(taxels), sampling_rate_hz=static_rate_hz
-        )
-        self._next_index: int | None = None  # none published yet
-        self._image: tuple[int, ...] | None = None
-        self._image_index = 0
-        self._last_published: tuple[int, ...] | None = None
-        self._tick = 0
-        self._frames_per_tick = RATE_HZ / static_rate_hz
-
-    @property
-    def has_motion(self) -> bool:
-        """Whether the inertial sensors are published."""
-        return bool(len(self._motion_gains))
-
-    def cut(self, indices: Sequence[int], frames: Sequence[SampleFrame]) -> Mapping[str, list[TactileSignal]]:
-        """Return the batches by topic; nothing while the clock is not settled."""
-        if not self._clock.settled:
-            return {}
-        batches: dict[str, list[TactileSignal]] = {SIGNAL: [], BATCH_STATIC: [], IMU: []}
-        for first, members in _runs(indices, frames):
-            if first != self._next_index:
-                self._jump(first)
-            self._next_index = first + len(members)
-            self.samples += len(members)
-            stamp_ns = self._clock.time_ns(first)
-            dynamic = np.array([item.dynamic for item in members], dtype=np.float32)[:, None]
-            batches[SIGNAL].append(self._dynamic(stamp_ns=stamp_ns, first_sample=first, samples=dynamic))
-            batches[BATCH_STATIC].extend(self._images(first, members))
-            motion = np.array([item.motion for item in members])
-            if self.has_motion and not np.isnan(motion).all():  # the device has sent some of it
-                motion = (motion * self._motion_gains).astype(np.float32)
-                batches[IMU].append(self._motion(stamp_ns=stamp_ns, first_sample=first, samples=motion))
-        return batches
-
-    def _jump(self, first: int) -> None:
-        self.lost += 0 if self._next_index is None else first - self._next_index
-        self._tick = math.ceil(first / self._frames_per_tick)
-
-    def _images(self, first: int, members: Sequence[SampleFrame]) -> Iterator[TactileSignal]:
-        for index, item in enumerate(members, first):
-            if item.image is not None:
-                self._image, self._image_index = item.image, index
-            while self._tick * self._frames_per_tick <= index:
-                if self._image is not None and index - self._image_index <= IMAGE_HOLD_S * RATE_HZ:
-                    yield self._published(self._image)
-                self._tick += 1
-
-    def _published(self, image: tuple[int, ...]) -> TactileSignal:
-        self.images += 1
-        self.repeated_images += image == self._last_published
-        self._last_published = image
-        stamp_ns = self._clock.time_ns(self._tick * self._frames_per_tick)
-        return self._static(stamp_ns=stamp_ns, first_sample=self._tick, samples=np.array([image], dtype=np.float32))
-
-
-def _runs(indices: Sequence[int], frames: Sequence[SampleFrame]) -> Iterator[tuple[int, list[SampleFrame]]]:
-    """Yield the first index and the sets of each run without a gap."""
-    numbered = enumerate(zip(indices, frames, strict=True))
-    for _, run in groupby(numbered, key=lambda item: item[1][0] - item[0]):
-        members = [numbered_frame for _, numbered_frame in run]
-        yield members[0][0], [item for _, item in members]
-
-
-# --------------------
-# One finger of a TSF-85: its sample frames become numbered, timed batches.
-
 SHORTEST_LOSS_S = 0.01  # what is late by less is no loss, where the firmware sends no stamps
+SIGNAL, BATCH_STATIC, IMU = 'signal', 'signal_static', 'signal_imu'
 
 
 class FingerStream:
     """Number the sample frames of one finger by the device's stamps, time them by the host's clock, cut batches.
 
-    Where the firmware sends no stamps, the host's clock also shows what was lost, half a second later.
+    Where the firmware sends no stamps, the host's clock also shows what was lost, half a second later. A new batch
+    begins wherever the index jumps; the newest taxel image is published at each tick of a constant rate.
     """
 
-    def __init__(
-        self, layout: Tsf85Layout = TSF85, settings: Tsf85Settings = Tsf85Settings(), frame_id: str = ''
-    ) -> None:
+    def __init__(self, layout: Tsf85Layout = TSF85, *, imu: bool = True, frame_id: str = '') -> None:
+        self.samples = self.lost = 0
         self.counter = SampleCounter(ticks=0)
         self._numbering = ArrivalNumbering(RATE_HZ, block_s=SHORTEST_LOSS_S / BLOCKS_LATE)
         self.clock = self._numbering.clock
-        self.cutter = BatchCutter(layout, settings, frame_id, self.clock)
+        self._imu = imu
+        self._static_rate_hz = layout.static_rate_hz
+        signal, taxels = partial(TactileSignal, frame_id=frame_id), layout.static_channels
+        self._dynamic = partial(
+            signal, sensor=DYNAMIC_SENSOR, channels=DYNAMIC_CHANNELS, units=(UNIT,), sampling_rate_hz=RATE_HZ
+        )
+        self._motion = partial(
+            signal, sensor=MOTION_SENSOR, channels=MOTION_CHANNELS, units=MOTION_UNITS, sampling_rate_hz=RATE_HZ
+        )
+        self._static = partial(
+            signal, sensor=STATIC_SENSOR, channels=taxels, units=(UNIT,) * len(taxels),
+            sampling_rate_hz=layout.static_rate_hz,
+        )  # fmt: skip
         self._waiting: list[SampleFrame] = []
+        self._next_index: int | None = None  # none published yet
+        self._image: tuple[int, ...] | None = None
+        self._image_index = 0
+        self._tick = 0
+        self._frames_per_tick = RATE_HZ / layout.static_rate_hz
 
     @property
     def rates_hz(self) -> Mapping[str, float]:
         """Nominal rate of each topic."""
-        rates = {SIGNAL: RATE_HZ, BATCH_STATIC: self.cutter.static_rate_hz}
-        return {**rates, IMU: RATE_HZ} if self.cutter.has_motion else rates
+        rates = {SIGNAL: RATE_HZ, BATCH_STATIC: self._static_rate_hz}
+        return {**rates, IMU: RATE_HZ} if self._imu else rates
 
     def interrupt(self) -> None:
         """Reset the state for a new stream."""
@@ -453,7 +319,7 @@ class FingerStream:
         self._waiting = []
 
     def place(self, frames: Sequence[SampleFrame], arrival_ns: int) -> Mapping[str, list[TactileSignal]]:
-        """Return the batches, by topic, that the sets make which have just arrived."""
+        """Return the batches, by topic, that the sets make which have just arrived; none while no time is known."""
         if not frames:
             return {}
         waiting = [*self._waiting, *frames]
@@ -466,28 +332,110 @@ class FingerStream:
             self.counter.skip(skipped)
         if restarted:
             self.interrupt()
-        return self.cutter.cut([index + skipped for index in indices], placed) if indices else {}
+        return self._cut([index + skipped for index in indices], placed) if indices and self.clock.settled else {}
+
+    def _cut(self, indices: Sequence[int], frames: Sequence[SampleFrame]) -> Mapping[str, list[TactileSignal]]:
+        batches: dict[str, list[TactileSignal]] = {SIGNAL: [], BATCH_STATIC: [], IMU: []}
+        # Runs without a gap: there index and place differ by the same number.
+        numbered = enumerate(zip(indices, frames, strict=True))
+        for _, run in groupby(numbered, key=lambda item: item[1][0] - item[0]):
+            members_at = [numbered_frame for _, numbered_frame in run]
+            first, members = members_at[0][0], [item for _, item in members_at]
+            if first != self._next_index:
+                self.lost += 0 if self._next_index is None else first - self._next_index
+                self._tick = math.ceil(first / self._frames_per_tick)
+            self._next_index = first + len(members)
+            self.samples += len(members)
+            stamp_ns = self.clock.time_ns(first)
+            dynamic = np.array([item.dynamic for item in members], dtype=np.float32)[:, None]
+            batches[SIGNAL].append(self._dynamic(stamp_ns=stamp_ns, first_sample=first, samples=dynamic))
+            batches[BATCH_STATIC].extend(self._images(first, members))
+            motion = np.array([item.motion for item in members])
+            if self._imu and not np.isnan(motion).all():  # the device has sent some of it
+                motion = (motion * MOTION_GAINS).astype(np.float32)
+                batches[IMU].append(self._motion(stamp_ns=stamp_ns, first_sample=first, samples=motion))
+        return batches
+
+    def _images(self, first: int, members: Sequence[SampleFrame]) -> Iterator[TactileSignal]:
+        for index, item in enumerate(members, first):
+            if item.image is not None:
+                self._image, self._image_index = item.image, index
+            while self._tick * self._frames_per_tick <= index:
+                if self._image is not None and index - self._image_index <= IMAGE_HOLD_S * RATE_HZ:
+                    stamp_ns = self.clock.time_ns(self._tick * self._frames_per_tick)
+                    image = np.array([self._image], dtype=np.float32)
+                    yield self._static(stamp_ns=stamp_ns, first_sample=self._tick, samples=image)
+                self._tick += 1
 
 
 # --------------------
 # The TSF-85 fingertip as a sensor of the suite.
+
+
+@dataclass(frozen=True)
+class Tsf85Settings:
+    """What is published of a TSF-85 in addition to its tactile signals."""
+
+    imu: bool = param(True, "Publishes acceleration and angular rate on the topic 'signal_imu'.")
+
 
 SILENCE_S = 0.5  # an open port may stay silent after an unclean end; stop and start wake the device
 REVIVALS = 3  # restarts, as the vendor does, before the port is closed
 REVIVAL_PAUSE_S = 0.05  # between stop and start
 
 
-class Tsf85Decoder(Decoder):
-    """Decode the packets of a hub; see `texture_drivers.serial_line.Decoder`."""
+class Tsf85(SerialSensor):
+    """Read a TSF-85: 'signal' at 1 kHz, 'signal_static' (7 rows of 4 taxels) at a constant rate, 'signal_imu' at 1 kHz.
 
-    def __init__(self, layout: Tsf85Layout, params: SensorParams, prefixes: Mapping[int, str]) -> None:
-        settings = load_settings(Tsf85Settings, params.config)
-        self._prefixes = prefixes
+    The device's stamps number the samples, so losses are known exactly; over an interruption the host's clock
+    does. Taxel images come irregularly (or, from old firmware, repeated each millisecond): the newest one is published
+    at each tick of the static rate. See `texture_core.types.Sensor`.
+
+    Parameters
+    ----------
+    params
+        `device` is a path or 'auto', `finger` 0 or 1, `config` means `Tsf85Settings`.
+    now_ns
+        The host's clock.
+    layout
+        Kind of fingertip.
+    fingers
+        Several fingers instead of `params.finger`; topics are then 'finger0/signal' and so on.
+
+    Raises
+    ------
+    InvalidParameter
+        If there is no such finger, or the settings are wrong.
+    """
+
+    def __init__(
+        self,
+        params: SensorParams,
+        now_ns: Callable[[], int] = time.time_ns,
+        *,
+        layout: Tsf85Layout = TSF85,
+        fingers: Sequence[int] = (),
+    ) -> None:
+        if not fingers and params.finger >= FINGERS:
+            raise InvalidParameter(f"parameter 'finger' is {params.finger}; a TSF-85 has the fingers 0 and 1")
+        super().__init__(params, now_ns, start_command=START_COMMAND, stop_command=STOP_COMMAND)
+        imu = load_settings(Tsf85Settings, params.config).imu
+        self._prefixes = {finger: f'finger{finger}/' for finger in fingers} or {params.finger: ''}
         self._parser = Tsf85Parser(layout)
-        self._splitters = {finger: SampleFrameSplitter(finger, settings.kinds) for finger in prefixes}
-        self._fingers = {finger: FingerStream(layout, settings, params.frame_id) for finger in prefixes}
+        self._splitters = {finger: SampleFrameSplitter(finger) for finger in self._prefixes}
+        self._fingers = {finger: FingerStream(layout, imu=imu, frame_id=params.frame_id) for finger in self._prefixes}
         self._last_packet: Packet | None = None
         self._frames = self._repeated = 0
+        self._serial = ''
+        self._revived = self._revivals = 0
+
+    def open(self) -> None:
+        """Open the device and start its stream; DeviceError if it cannot be reached."""
+        self.close()
+        self._path = serial_line.resolve(self._params.device, USB_IDS, 'TSF-85')
+        super().open()
+        self._serial = serial_line.serial_number(self._path)
+        self._revivals = 0
 
     @property
     def valid_frames(self) -> int:
@@ -497,26 +445,27 @@ class Tsf85Decoder(Decoder):
     @property
     def counts(self) -> Mapping[str, int]:
         """Totals: samples published, samples lost, bogus candidates and bytes refused, and what was done about it."""
-        cutters = [finger.cutter for finger in self._fingers.values()]
+        fingers = self._fingers.values()
         return {
-            'samples': sum(cutter.samples for cutter in cutters),
-            'lost': sum(cutter.lost for cutter in cutters),
+            'samples': sum(finger.samples for finger in fingers),
+            'lost': sum(finger.lost for finger in fingers),
             'bogus': self._parser.refused,
             'refused_bytes': self._parser.refused_bytes,
             'repeated': self._repeated,
-            'damaged_stamps': sum(finger.counter.damaged_stamps for finger in self._fingers.values()),
-            'images': sum(cutter.images for cutter in cutters),
-            'repeated_images': sum(cutter.repeated_images for cutter in cutters),
-            'clock_steps': sum(finger.clock.steps for finger in self._fingers.values()),
+            'damaged_stamps': sum(finger.counter.damaged_stamps for finger in fingers),
+            'clock_steps': sum(finger.clock.steps for finger in fingers),
+            'revived': self._revived,
+            **super().counts,
         }
 
     @property
-    def details(self) -> Mapping[str, float]:
-        """How much the device's clock is slow."""
-        return {SLOW_CLOCK: PPM * next(iter(self._fingers.values())).clock.drift}
+    def details(self) -> Mapping[str, str | float]:
+        """Serial number of the USB device if it has one, and how much its clock is slow."""
+        serial = {'serial number': self._serial} if self._serial else {}
+        return {**serial, SLOW_CLOCK: PPM * next(iter(self._fingers.values())).clock.drift}
 
     @property
-    def rates_hz(self) -> Mapping[str, float]:
+    def expected_rates_hz(self) -> Mapping[str, float]:
         """Nominal rate of each topic."""
         return {
             f'{prefix}{topic}': rate
@@ -556,67 +505,6 @@ class Tsf85Decoder(Decoder):
             self._last_packet = packet
         return unique
 
-
-class Tsf85(SerialSensor):
-    """Read a TSF-85: 'signal' at 1 kHz, 'signal_static' (7 rows of 4 taxels) at a constant rate, 'signal_imu' at 1 kHz.
-
-    The device's stamps number the samples, so losses are known exactly; over an interruption the host's clock
-    does. Taxel images come irregularly (or, from old firmware, repeated each millisecond): the newest one is published
-    at each tick of the static rate. See `texture_core.types.Sensor`.
-
-    Parameters
-    ----------
-    params
-        `device` is a path or 'auto', `finger` 0 or 1, `config` means `Tsf85Settings`.
-    now_ns
-        The host's clock.
-    layout
-        Kind of fingertip.
-    fingers
-        Several fingers instead of `params.finger`; topics are then 'finger0/signal' and so on.
-
-    Raises
-    ------
-    InvalidParameter
-        If there is no such finger, or the settings are wrong.
-    """
-
-    def __init__(
-        self,
-        params: SensorParams,
-        now_ns: Callable[[], int] = time.time_ns,
-        *,
-        layout: Tsf85Layout = TSF85,
-        fingers: Sequence[int] = (),
-    ) -> None:
-        if not fingers and params.finger >= FINGERS:
-            raise InvalidParameter(f"parameter 'finger' is {params.finger}; a TSF-85 has the fingers 0 and 1")
-        self._published = fingers or (params.finger,)
-        prefixes = {finger: f'finger{finger}/' for finger in fingers} or {params.finger: ''}
-        decoder = Tsf85Decoder(layout, params, prefixes)
-        super().__init__(params, now_ns, decoder, start_command=START_COMMAND, stop_command=STOP_COMMAND)
-        self._serial = ''
-        self._revived = self._revivals = 0
-
-    def open(self) -> None:
-        """Open the device and start its stream; DeviceError if it cannot be reached."""
-        self.close()
-        self._path = serial_line.resolve(self._params.device, USB_IDS, 'TSF-85')
-        super().open()
-        self._serial = serial_line.serial_number(self._path)
-        self._revivals = 0
-
-    @property
-    def counts(self) -> Mapping[str, int]:
-        """Totals of the decoder, and how often the device was reopened and restarted."""
-        return {**super().counts, 'revived': self._revived}
-
-    @property
-    def details(self) -> Mapping[str, str | float]:
-        """Serial number of the USB device if it has one, and the drift of its clock."""
-        serial = {'serial number': self._serial} if self._serial else {}
-        return {**serial, **super().details}
-
     def _act_on_silence(self) -> None:
         """Wake a device that is open but silent; DeviceError when that does not help."""
         if not self._silent_s:
@@ -631,11 +519,11 @@ class Tsf85(SerialSensor):
         self.send(self._stop_command)
         time.sleep(REVIVAL_PAUSE_S)
         self.send(self._start_command)
-        self._decoder.restart()
+        self.restart()
 
     def _silence_sentence(self) -> str:
         if self._babbles:
-            fingers = ' or '.join(str(finger) for finger in self._published)
+            fingers = ' or '.join(str(finger) for finger in self._prefixes)
             return (
                 f"device '{self._params.device}' sends bytes, but no known packet of finger "
                 f'{fingers}; check the finger, that it is a TSF-85, and its firmware (1.0.6 to 1.1.8 are known)'

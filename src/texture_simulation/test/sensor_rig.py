@@ -47,7 +47,7 @@ DEVICES: Mapping[str, Callable[[Path, np.random.Generator], EmulatedDevice]] = {
 class RigCase:
     """How a device is fed, and how what arrives is to be read.
 
-    Sample i of `topic` holds `slope` · i and a constant, modulo `modulus`.
+    Sample i of `topic` holds i and a constant, modulo `modulus`.
     """
 
     topic: str  # The fast one
@@ -58,7 +58,6 @@ class RigCase:
     # Unit of each topic that must come: one for all of its channels, or one for each
     units: Mapping[str, str | tuple[str, ...]]
     modulus: int
-    slope: int = 1
     config: str = ''  # Settings of the sensor, so that it publishes counts
 
     @property
@@ -67,13 +66,18 @@ class RigCase:
         return self.ticks_per_s * self.samples_per_tick
 
 
-def feed_tsf85(shape: tuple[int, ...]) -> Feed:
-    """Return what feeds a TSF-85 with images of a shape; for two fingers both feel the same."""
+def counting(first: int, samples: int, modulus: int, *shape: int) -> AnyArray:
+    """Return consecutive samples that hold their number in all of (n_channels, n_fingers)."""
+    numbers = np.arange(first, first + samples) % modulus
+    return np.broadcast_to(numbers[:, None, None], (samples, *shape))
+
+
+def feed_tsf85(taxels: int, fingers: int) -> Feed:
+    """Return what feeds a TSF-85 with images of so many taxels; all fingers feel the same."""
 
     def feed(device: Any, first: int, ticks: int) -> None:
-        numbers = np.arange(first, first + ticks) % 1000
-        dynamic = np.repeat(numbers[:, None], 2, axis=1) if len(shape) == 2 else numbers
-        device.measure((dynamic.astype(np.int16), np.full((1, *shape), first % 1000, dtype=np.uint16)))
+        image = np.full((1, taxels, fingers), first % 1000)
+        device.measure({'signal': counting(first, ticks, 1000, 1, fingers), 'signal_static': image})
 
     return feed
 
@@ -82,29 +86,24 @@ def feed_biotac(slots: int, fingers: int) -> Feed:
     """Return what feeds a board with frames of this many slots."""
 
     def feed(device: Any, first: int, ticks: int) -> None:
-        numbers = np.arange(first * slots, (first + ticks) * slots) % 4096
-        device.measure(np.repeat(numbers[:, None], fingers, axis=1).astype(np.uint16).reshape(ticks, slots, fingers))
+        pac = counting(first * slots // 2, ticks * slots // 2, 4096, 1, fingers)
+        device.measure({'signal': pac, 'signal_static': counting(first, ticks, 4096, slots // 2, fingers)})
 
     return feed
 
 
-def feed_alike(channels: int, kind: type[np.generic]) -> Feed:
-    """Return what feeds this many channels alike, with numbers of this type."""
-
-    def feed(device: Any, first: int, ticks: int) -> None:
-        numbers = np.arange(first, first + ticks) % 30_000
-        device.measure(np.outer(numbers, np.ones(channels)).astype(kind))
-
-    return feed
+def feed_alike(channels: int) -> Feed:
+    """Return what feeds this many channels alike."""
+    return lambda device, first, ticks: device.measure({'signal': counting(first, ticks, 30_000, channels, 1)})
 
 
 def feed_pvdf(device: Any, first: int, ticks: int) -> None:
     """Feed the film, and the force with every 64th tick."""
-    numbers = np.arange(first, first + ticks)
-    device.measure(((numbers % 30_000).astype(np.int16), (numbers[numbers % 64 == 0] // 64 % 30_000).astype(np.int16)))
+    film = counting(first, ticks, 30_000 * 64, 1, 1)
+    device.measure({'signal': film % 30_000, 'signal_static': film[film[:, 0, 0] % 64 == 0] // 64})
 
 
-def tsf85(prefix: str = '', shape: tuple[int, ...] = (28,)) -> RigCase:
+def tsf85(prefix: str = '', taxels: int = 28, fingers: int = 1) -> RigCase:
     """Return how a TSF-85 is fed."""
     imu = ('m/s²',) * 3 + ('rad/s',) * 3
     units: dict[str, str | tuple[str, ...]] = {
@@ -112,31 +111,28 @@ def tsf85(prefix: str = '', shape: tuple[int, ...] = (28,)) -> RigCase:
         f'{prefix}signal_static': 'count',
         f'{prefix}signal_imu': imu,
     }
-    return RigCase(f'{prefix}signal', 1000.0, 1, feed_tsf85(shape), units, 1000)
+    return RigCase(f'{prefix}signal', 1000.0, 1, feed_tsf85(taxels, fingers), units, 1000)
 
 
 def biotac(prefix: str = '', slots: int = 44, fingers: int = 1) -> RigCase:
     """Return how a BioTac is fed."""
     units: dict[str, str | tuple[str, ...]] = {f'{prefix}signal': 'count', f'{prefix}signal_static': 'count'}
-    return RigCase(f'{prefix}signal', 4400 / slots, slots // 2, feed_biotac(slots, fingers), units, 4096, slope=2)
+    return RigCase(f'{prefix}signal', 4400 / slots, slots // 2, feed_biotac(slots, fingers), units, 4096)
 
 
 CASES: Mapping[str, RigCase] = {
     'tsf85': tsf85(),
-    'tsf85_pair': tsf85('finger1/', (2, 28)),
-    'tsf85_3x4': tsf85(shape=(12,)),
+    'tsf85_pair': tsf85('finger1/', fingers=2),
+    'tsf85_3x4': tsf85(taxels=12),
     'biotac': biotac(),
     'biotac_sp': biotac(slots=54),
     'biotac_hand': biotac('finger2/', fingers=3),
-    'daq': RigCase('signal', 2500.0, 1, feed_alike(8, np.int16), {'signal': 'count'}, 30_000, config=DAQ),
+    'daq': RigCase('signal', 2500.0, 1, feed_alike(8), {'signal': 'count'}, 30_000, config=DAQ),
     'pvdf': RigCase(
         'signal', 4096.0, 1, feed_pvdf, {'signal': 'pC', 'signal_static': 'N'}, 30_000,
         config='{film_gain_pc: 1.0, force_gain_n: 1.0}',
     ),
-    'anyskin': RigCase(
-        'signal', 250.0, 1, feed_alike(15, np.float64), {'signal': 'µT', 'temperature': '°C'}, 30_000,
-        config='{rate_hz: 250.0, temperature: true}',
-    ),
+    'anyskin': RigCase('signal', 250.0, 1, feed_alike(15), {'signal': 'µT'}, 30_000, config='{rate_hz: 250.0}'),
 }  # fmt: skip
 
 DEADLINE_S = 30.0
@@ -245,13 +241,12 @@ class Rig:
         """Return the difference of each finite sample and the value of its index: constant if each is in its place."""
         values = np.concatenate([batch.samples[:, 0] for batch in batches])
         indices = np.concatenate([np.arange(batch.first_sample, batch.next_sample) for batch in batches])
-        offsets: AnyArray = (values - self.case.slope * indices) % self.case.modulus
+        offsets: AnyArray = (values - indices) % self.case.modulus
         finite: AnyArray = offsets[np.isfinite(values)]
         return finite
 
     def lateness_s(self, batch: TactileSignal) -> float:
         """Return by how much a stamp is later than its sample was taken."""
         samples = (batch.stamp_ns - self.start_ns) / NANOSECONDS * self.case.rate_hz
-        turn = self.case.modulus / self.case.slope
-        late = samples - float(batch.samples[0, 0]) / self.case.slope
+        turn, late = self.case.modulus, samples - float(batch.samples[0, 0])
         return ((late + turn / 2) % turn - turn / 2) / self.case.rate_hz

@@ -78,24 +78,17 @@ def test_a_sync_read_ends_at_the_first_that_is_silent(bus):
     assert bus.receive(ask).count(b'\xff\xff\xfd\x00') == 2
 
 
-def test_the_goal_current_bounds_the_force(bus):
+@pytest.mark.parametrize('stiffness_n_m', [2000.0, 1e5])
+def test_the_goal_current_bounds_the_force_however_stiff_the_object(bus, stiffness_n_m):
+    bus.motors.stiffness_n_m = stiffness_n_m
     for address, value, size in ((84, 600, 2), (102, 200, 2), (116, 2048 + 400, 4), (64, 1, 1)):
         bus.receive(write(1, address, value, size))
     bus.motors.advance(4000)
-    assert bus.motors.forces_n[1] == pytest.approx(0.2 * 0.517 / 0.1, rel=0.01)  # current · torque constant / lever
-    assert read(bus, 1, 126, '<h') == 200
-
-
-def test_a_motor_presses_calmly_however_stiff_the_object():
-    stiff = EmulatedDynamixelBus(
-        Path('/nowhere'), DynamixelMotors([1], {1: PressingMotor(0.1, 0.01)}, stiffness_n_m=1e5)
-    )
-    for address, value, size in ((84, 600, 2), (102, 200, 2), (116, 2048 + 400, 4), (64, 1, 1)):
-        stiff.receive(write(1, address, value, size))
-    stiff.motors.advance(4000)
     for _ in range(20):
-        stiff.motors.advance(1)
-        assert stiff.motors.forces_n[1] == pytest.approx(0.2 * 0.517 / 0.1, rel=0.01)
+        bus.motors.advance(1)
+        # current · torque constant / lever
+        assert bus.motors.forces_n[1] == pytest.approx(0.2 * 0.517 / 0.1, rel=0.01)
+    assert read(bus, 1, 126, '<h') == 200
 
 
 def test_a_free_motor_goes_to_its_goal(bus):
@@ -137,15 +130,6 @@ def test_a_motor_that_hears_nothing_stops_and_takes_no_goal_until_its_watchdog_i
         assert error_of(bus, write(1, address, 100, size)) == RANGE
     assert error_of(bus, write(1, 98, 0, 1)) == 0
     assert error_of(bus, write(1, 102, 100, 2)) == 0
-
-
-def test_firmware_whose_watchdog_only_reports_presses_on():
-    motors = DynamixelMotors([1, 2], {1: PressingMotor(0.1, 0.01)}, watchdog_stops=False)
-    bus = EmulatedDynamixelBus(Path('/nowhere'), motors)
-    pressed(bus)
-    bus.motors.advance(S)
-    assert read(bus, 1, 98, '<b') == -1
-    assert bus.motors.forces_n[1] == pytest.approx(0.2 * 0.517 / 0.1, rel=0.01)
 
 
 def test_a_watchdog_that_is_not_armed_or_without_torque_does_not_trip(bus):

@@ -37,27 +37,27 @@ def slide(n_frames: int, speed_m_s: float = 0.0, force_n: float = 2.0) -> Trajec
     return Trajectory(speed_m_s * time_s, np.zeros_like(time_s), np.full_like(time_s, force_n))
 
 
-def slow(values: np.ndarray, channel: str) -> np.ndarray:
-    return values[:, BIOTAC.slots.index(channel)].astype(float)
+def slow(path: Trajectory, channel: str) -> np.ndarray:
+    return model('flat').measure(path)['signal_static'][:, BIOTAC.slow_channels.index(channel)]
 
 
 def test_the_static_pressure_is_proportional_to_the_force() -> None:
-    free, pressed = (slow(model('flat').advance(slide(2, force_n=force_n)), 'pdc')[-1] for force_n in (0.0, 5.0))
+    free, pressed = (slow(slide(2, force_n=force_n), 'pdc')[-1] for force_n in (0.0, 5.0))
     assert pressed - free == pytest.approx(5.0 * PA_PER_N / PDC_PA, abs=1)
 
 
 def test_load_squeezes_the_fluid_away_from_the_electrodes_under_it() -> None:
-    free, pressed = (model('flat').advance(slide(1, force_n=force_n))[0].astype(float) for force_n in (0.0, 2.0))
-    change = (pressed - free)[list(BIOTAC.slow_slots[3:])]
+    free, pressed = (model('flat').measure(slide(1, force_n=force_n))['signal_static'][0] for force_n in (0.0, 2.0))
+    change = (pressed - free)[3:]
     assert change.min() < -300
     assert (change <= 0).all()
     assert (change == 0).any()  # far from the contact
 
 
 def test_touching_cools_the_finger() -> None:
-    values = model('flat').advance(slide(500))
-    assert slow(values, 'tdc')[-1] < slow(values, 'tdc')[0]
-    assert slow(values, 'tac')[10] < slow(values, 'tac')[-1]  # the flow of heat ebbs away
+    tdc, tac = (slow(slide(500), channel) for channel in ('tdc', 'tac'))
+    assert tdc[-1] < tdc[0]
+    assert tac[10] < tac[-1]  # the flow of heat ebbs away
 
 
 SPEED_M_S = 0.05  # over ridges of 1 mm: 50 Hz
@@ -77,14 +77,14 @@ def slide_at(rate_hz: float, seconds: float, speed_m_s: float = SPEED_M_S, force
 
 def test_films_forget_a_constant_force_and_gauges_do_not(scene: Scene) -> None:
     model = daq.DaqModel(scene, scene.surface('flat'), np.random.default_rng(0))
-    counts = model.advance(slide_at(daq.DAQ_PATH_RATE_HZ, 4.0, speed_m_s=0.0))
+    counts = model.measure(slide_at(daq.DAQ_PATH_RATE_HZ, 4.0, speed_m_s=0.0))['signal']
     assert np.abs(counts[-1, :4]).max() <= 1
     assert np.abs(counts[-1, 4:]).min() >= 2.0 / daq.VOLT_PER_COUNT - 1  # at least 2 V/N, at 1 N
 
 
 def test_what_lies_deeper_senses_fine_ridges_less(scene: Scene) -> None:
     model = daq.DaqModel(scene, scene.surface('ridges'), np.random.default_rng(0))
-    counts = model.advance(slide_at(daq.DAQ_PATH_RATE_HZ, 2.0))[2500:]
+    counts = model.measure(slide_at(daq.DAQ_PATH_RATE_HZ, 2.0))['signal'][2500:]
     measured = counts.std(axis=0) / np.abs(model.volt_per_n)
     assert measured[[0, 1, 4, 5]].min() > measured[[2, 3, 6, 7]].max()
 
@@ -92,7 +92,8 @@ def test_what_lies_deeper_senses_fine_ridges_less(scene: Scene) -> None:
 def test_the_daq_finger_passes_500_hz_at_half_power_and_little_above(scene: Scene) -> None:
     def measured(frequency_hz: float) -> float:
         model = daq.DaqModel(scene, scene.surface('ridges'), np.random.default_rng(0))
-        return float(model.advance(slide_at(daq.DAQ_PATH_RATE_HZ, 1.0, frequency_hz * PITCH_M))[1250:, 4].std())
+        path = slide_at(daq.DAQ_PATH_RATE_HZ, 1.0, frequency_hz * PITCH_M)
+        return float(model.measure(path)['signal'][1250:, 4].std())
 
     assert measured(500.0) / measured(100.0) == pytest.approx(np.sqrt(0.5), rel=0.02)
     assert measured(1100.0) / measured(100.0) < 0.05
@@ -100,8 +101,7 @@ def test_the_daq_finger_passes_500_hz_at_half_power_and_little_above(scene: Scen
 
 def test_the_film_answers_a_touch_with_a_charge_that_leaks_away(scene: Scene) -> None:
     model = pvdf.PvdfModel(scene, scene.surface('flat'), np.random.default_rng(0))
-    film, _ = model.advance(slide_at(pvdf.PVDF_PATH_RATE_HZ, 2.0, speed_m_s=0.0, force_n=1.5))
-    charge_pc = film * tables.FILM_PC_PER_COUNT
+    charge_pc = model.streams(slide_at(pvdf.PVDF_PATH_RATE_HZ, 2.0, speed_m_s=0.0, force_n=1.5))['signal'][:, 0]
     at = round(0.106 * tables.FILM_RATE_HZ)  # R·C: 100 MΩ and 1.06 nF
     assert charge_pc.max() == pytest.approx(1.5 * 21.0, rel=0.1)  # the low-pass overshoots a little
     assert charge_pc[at] == pytest.approx(1.5 * 21.0 * np.exp(-1), rel=0.02)
@@ -110,9 +110,9 @@ def test_the_film_answers_a_touch_with_a_charge_that_leaks_away(scene: Scene) ->
 
 def test_the_force_sensor_reports_the_force_in_newtons_at_64_hz(scene: Scene) -> None:
     model = pvdf.PvdfModel(scene, scene.surface('flat'), np.random.default_rng(0))
-    _, force = model.advance(slide_at(pvdf.PVDF_PATH_RATE_HZ, 2.0, speed_m_s=0.0, force_n=1.5))
-    assert len(force) == 128
-    assert force[-1] * tables.FORCE_N_PER_COUNT == pytest.approx(1.5, abs=0.01)
+    force_n = model.streams(slide_at(pvdf.PVDF_PATH_RATE_HZ, 2.0, speed_m_s=0.0, force_n=1.5))['signal_static']
+    assert len(force_n) == 128
+    assert force_n[-1, 0] == pytest.approx(1.5, abs=0.01)
 
 
 def recorded(scene: Scene, speed_m_s: float, surface: str = 'sine', seed: int = 0, force_n: float = 2.0):
@@ -130,8 +130,10 @@ def test_the_image_rises_where_and_as_hard_as_the_finger_presses() -> None:
     scene = scene_from('t', {'surfaces': {'flat': []}})
     model = Tsf85Model(scene, scene.surface('flat'), np.random.default_rng(0))
     still = np.zeros(200)
-    free, pressed = (model.advance(Trajectory(still, still, still + force))[1][-1] for force in (0.0, 2.0))
-    rise = (pressed.astype(int) - free).reshape(7, 4)
+    free, pressed = (
+        model.measure(Trajectory(still, still, still + force))['signal_static'][-1] for force in (0.0, 2.0)
+    )
+    rise = (pressed - free).reshape(7, 4)
     assert rise.sum() == pytest.approx(6000, abs=20)
     assert rise[3, 1] >= rise.max() - 1
     assert rise[0, 0] == 0

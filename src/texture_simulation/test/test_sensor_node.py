@@ -65,7 +65,7 @@ def test_the_inertial_unit_is_published_as_imu_too(graph: LocalGraph, tmp_path: 
 
 def test_a_tare_is_requested_and_the_baseline_is_published_and_subtracted(graph: LocalGraph, tmp_path: Path) -> None:
     def feed(device: Any, first: int, ticks: int) -> None:
-        device.measure(np.full((ticks, 15), 0.25))
+        device.measure({'signal': np.full((ticks, 15, 1), 0.25)})
 
     case = replace(CASES['anyskin'], feed=feed)
     signal = graph.listen(msg.TactileSignal, 'signal', SENSOR_QOS)
@@ -99,7 +99,7 @@ def test_drift_saturation_and_a_dead_channel_are_named_on_diagnostics(
         counts = np.round(20.0 * rng.normal(size=(ticks, 8))).astype(np.int16)
         counts[:, 0] += drift[0]
         counts[:, 3], counts[:, 7] = 2**15 - 1, 500
-        device.measure(counts)
+        device.measure({'signal': counts[:, :, None]})
 
     monkeypatch.setattr(stream_watch, 'DEAD_S', 2.0)
     case = replace(CASES['daq'], feed=feed)

@@ -52,7 +52,7 @@ def test_the_watchdog_stops_the_program_only_when_it_is_not_kicked(done):
 
 def test_a_protective_stop_refuses_commands_until_it_is_unlocked(done):
     assert done['protective_stop'] == [True, 3, False]
-    assert done['dashboard'] == ['5.12.0.0', 'Robotmode: RUNNING', 'Safetystatus: PROTECTIVE_STOP']
+    assert done['dashboard'] == ['5.12.0.0', 'Robotmode: RUNNING', 'Safetymode: PROTECTIVE_STOP']
     assert done['unlocked'] == [True, True]
     assert done['script_stopped']
 

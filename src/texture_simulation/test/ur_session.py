@@ -70,7 +70,7 @@ def main(ip):
         done['protective_stop'] = [until(receive.isProtectiveStopped), receive.getSafetyMode(), control.speedStop()]
     dashboard = DashboardClient(ip)
     dashboard.connect()
-    done['dashboard'] = [dashboard.polyscopeVersion(), dashboard.robotmode(), dashboard.safetystatus()]
+    done['dashboard'] = [dashboard.polyscopeVersion(), dashboard.robotmode(), dashboard.safetymode()]
     dashboard.unlockProtectiveStop()
     control.reuploadScript()
     done['unlocked'] = [until(control.isProgramRunning), control.speedStop()]

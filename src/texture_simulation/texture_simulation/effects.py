@@ -166,13 +166,7 @@ class Skids:
     A cheap approximation of stick-slip, for slides of which some failed.
     """
 
-    per_s: float = param(
-        0.5,
-        'Rate at which the skin sticks and jumps.',
-        unit='1/s',
-        low=0.0,
-        high=20.0,
-    )
+    per_s: float = param(0.5, 'Rate at which the skin sticks and jumps.', unit='1/s', low=0.0, high=20.0)
     length_s: float = param(0.05, 'Duration of sticking before the jump.', unit='s', low=1e-3, high=1.0)
 
     def start_path(self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape) -> TrajectoryFilter:

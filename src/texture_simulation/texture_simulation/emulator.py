@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -16,7 +16,7 @@ import numpy as np
 from texture_core.config import find, param
 from texture_core.types import DEVICES, NANOSECONDS, FingerReceiver, FingerState
 from texture_simulation import sensor_models as models
-from texture_simulation.devices import fingers
+from texture_simulation.devices import fingers as devices
 from texture_simulation.path import FingerTrack
 from texture_simulation.scene import Scene, load_scene
 from texture_simulation.surfaces import Surface
@@ -29,15 +29,12 @@ LONGEST_BURST_S = 0.25
 
 
 class LiveSensor:
-    """Follow the finger with one sensor."""
+    """Fingers of one sensor that slide together, each an individual that touches a separate place."""
 
     def __init__(
-        self,
-        model: models.SensorModel | models.JoinedFingers,
-        device: fingers.EmulatedDevice,
-        kind: models.SensorKind,
+        self, fingers: Sequence[models.SensorModel], device: devices.EmulatedDevice, kind: models.SensorKind
     ) -> None:
-        self.model = model
+        self.fingers = fingers
         self.device = device
         self.done = 0  # steps, those that were skipped among them
         self.skipped = 0
@@ -45,6 +42,16 @@ class LiveSensor:
         self._rate_hz = kind.path_rate_hz / kind.step_points
         self._track = FingerTrack()
         self._start_ns: int | None = None
+
+    @property
+    def surface(self) -> Surface:
+        """What is touched."""
+        return self.fingers[0].touch.surface
+
+    @surface.setter
+    def surface(self, surface: Surface) -> None:
+        for finger in self.fingers:
+            finger.touch.surface = surface
 
     def update(self, state: FingerState) -> None:
         """Take note of where the finger is."""
@@ -66,8 +73,10 @@ class LiveSensor:
         was_touching = self._track.touching
         path = self._track.advance(until_ns, self._points * steps, self._points_hz)
         if not was_touching and self._track.touching:
-            self.model.touch.relocate()
-        self.device.measure(self.model.advance(path))
+            for finger in self.fingers:
+                finger.touch.relocate()
+        measured = [finger.measure(path) for finger in self.fingers]
+        self.device.measure({topic: np.stack([one[topic] for one in measured], axis=-1) for topic in measured[0]})
 
 
 # --------------------
@@ -78,30 +87,29 @@ class LiveSensor:
 # touched, the symbolic link that leads to the device, and all random numbers: positions, effects, noise.
 MakeLiveSensor = Callable[[Scene, Surface, Path, np.random.Generator], LiveSensor]
 
-Model = models.SensorModel | models.JoinedFingers
-
 
 def _live(
-    kind: str,
-    device: Callable[[Path, np.random.Generator], fingers.EmulatedDevice],
-    model: Callable[[Scene, Surface, np.random.Generator], Model] | None = None,
+    kind: models.SensorKind, device: Callable[[Path, np.random.Generator], devices.EmulatedDevice], fingers: int = 1
 ) -> MakeLiveSensor:
-    """Return what makes a sensor of a kind on a device; without a model it is a finger alone."""
-    make = model or models.SENSORS[kind].make
-    return lambda scene, surface, link, rng: LiveSensor(
-        make(scene, surface, rng), device(link, rng), models.SENSORS[kind]
-    )
+    """Return what makes a sensor of a kind with some fingers on a device."""
+
+    def make(scene: Scene, surface: Surface, link: Path, rng: np.random.Generator) -> LiveSensor:
+        made = [kind.make(scene.of_finger(finger), surface, rng, finger=finger) for finger in range(fingers)]
+        return LiveSensor(made, device(link, rng), kind)
+
+    return make
 
 
+SERIALS = ('BT-0', 'BT-1', 'BT-2')  # of the BioTacs of a hand, by place
 LIVE_SENSORS: Mapping[str, MakeLiveSensor] = {
-    'tsf85': _live('tsf85', fingers.EmulatedTsf85),
-    'tsf85_pair': _live('tsf85', fingers.EmulatedTsf85, models.tsf85_pair),
-    'tsf85_3x4': _live('tsf85_3x4', fingers.EmulatedTsf85),
-    'biotac': _live('biotac', fingers.EmulatedBioTac, partial(models.biotac_hand, places=1)),
-    'biotac_hand': _live('biotac', partial(fingers.EmulatedBioTac, serials=models.SERIALS), models.biotac_hand),
-    'daq': _live('daq', fingers.EmulatedDaq),
-    'pvdf': _live('pvdf', fingers.EmulatedPvdf),
-    'anyskin': _live('anyskin', fingers.EmulatedAnySkin),
+    'tsf85': _live(models.SENSORS['tsf85'], devices.EmulatedTsf85),
+    'tsf85_pair': _live(models.SENSORS['tsf85'], devices.EmulatedTsf85, 2),
+    'tsf85_3x4': _live(models.SENSORS['tsf85_3x4'], devices.EmulatedTsf85),
+    'biotac': _live(models.SENSORS['biotac'], devices.EmulatedBioTac),
+    'biotac_hand': _live(models.SENSORS['biotac'], partial(devices.EmulatedBioTac, serials=SERIALS), len(SERIALS)),
+    'daq': _live(models.SENSORS['daq'], devices.EmulatedDaq),
+    'pvdf': _live(models.SENSORS['pvdf'], devices.EmulatedPvdf),
+    'anyskin': _live(models.SENSORS['anyskin'], devices.EmulatedAnySkin),
 }
 
 
@@ -119,9 +127,7 @@ class EmulatorParams:
     surface: str = param('glass', 'Surface under the finger; setting it at run time swaps the sample.')
     seed: int = param(0, 'Seed of all randomness; equal seeds give equal signals.', low=0)
     sensor: str = param(
-        '',
-        "Emulated sensor, which appears at `sensor_link`; '' takes that of the scene.",
-        choices=('', *LIVE_SENSORS),
+        '', "Emulated sensor, which appears at `sensor_link`; '' takes that of the scene.", choices=('', *LIVE_SENSORS)
     )
     sensor_link: str = param(
         f'{DEVICES}/sensor',
@@ -129,10 +135,7 @@ class EmulatorParams:
     )
     plugged: bool = param(True, 'Plugs the emulated sensor in; setting it to false at run time unplugs it.')
     unplugged_finger: int = param(
-        -1,
-        'Finger of a TSF-85 whose plug is out of the hub, which may be set at run time; -1 is none.',
-        low=-1,
-        high=1,
+        -1, 'Finger of a TSF-85 whose plug is out of the hub, which may be set at run time; -1 is none.', low=-1, high=1
     )
     bit_flips: float = param(
         0.0,
@@ -179,7 +182,7 @@ class Emulator:
         self.stop()
 
     @property
-    def device(self) -> fingers.EmulatedDevice:
+    def device(self) -> devices.EmulatedDevice:
         """The device of the sensor."""
         return self._sensor.device
 
@@ -191,11 +194,11 @@ class Emulator:
     @property
     def surface(self) -> str:
         """Name of the surface under the finger."""
-        return self._sensor.model.touch.surface.name
+        return self._sensor.surface.name
 
     def set_surface(self, name: str) -> None:
         """Swap the sample; UnknownName, with the nearest name, if there is none such."""
-        self._sensor.model.touch.surface = self.scene.surface(name)
+        self._sensor.surface = self.scene.surface(name)
 
     def start(self) -> None:
         """Plug the sensor in and let time run."""
@@ -223,12 +226,12 @@ class Emulator:
     def unplug_finger(self, finger: int) -> None:
         """Pull the plug of one finger of a TSF-85 out of its hub; -1 plugs all in."""
         device = self.device
-        if isinstance(device, fingers.EmulatedTsf85):
-            self._in_thread(partial(device.plug_fingers, [finger != other for other in range(fingers.FINGERS)]))
+        if isinstance(device, devices.EmulatedTsf85):
+            self._in_thread(partial(device.plug_fingers, [finger != other for other in range(devices.FINGERS)]))
 
     def flip_bits(self, probability: float) -> None:
         """Make the line of the sensor a bad one; 0 makes it a good one again."""
-        self.device.faults = fingers.ByteFaults(flip=probability)
+        self.device.faults = devices.ByteFaults(flip=probability)
 
     @property
     def counts(self) -> Mapping[str, int]:

@@ -242,10 +242,7 @@ class SlidePlan:
     slide_s: float = param(3.0, 'Duration of the steady part of a slide.', unit='s', low=0.1, high=600.0)
     direction_rad: float = param(0.0, 'Direction of travel, from +x towards +y.', unit='rad', low=-10.0, high=10.0)
     fingers: int = param(
-        1,
-        "Number of fingers that slide together; the topics of several are 'finger0/signal' and so on.",
-        low=1,
-        high=5,
+        1, "Number of fingers that slide together; the topics of several are 'finger0/signal' and so on.", low=1, high=5
     )
 
 

@@ -30,13 +30,7 @@ class Contact:
         low=1e-5,
         high=1e-3,
     )
-    stiffness_n_m: float = param(
-        2000.0,
-        'Force per height of the texture.',
-        unit='N/m',
-        low=1.0,
-        high=1e6,
-    )
+    stiffness_n_m: float = param(2000.0, 'Force per height of the texture.', unit='N/m', low=1.0, high=1e6)
     tip_radius_m: float = param(
         7e-3,
         'Radius of curvature of the fingertip; on a curved object a larger one changes the contact more.',

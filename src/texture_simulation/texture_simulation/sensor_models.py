@@ -5,9 +5,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import lru_cache, partial
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +27,6 @@ from texture_simulation.surfaces import Surface
 
 # --------------------
 # From exact values to what a converter sends, with the effects on the way.
-
-Integer = TypeVar('Integer', bound=np.integer[Any])
 
 
 class Converter:
@@ -63,10 +61,6 @@ class Converter:
         whole = np.rint(counts)
         return np.clip(whole, *self._limits, out=whole)
 
-    def counts(self, counts: Samples, kind: type[Integer]) -> NDArray[Integer]:
-        """Return the same as whole numbers."""
-        return self.exact(counts).astype(kind)
-
 
 # --------------------
 # What every simulated sensor has in common.
@@ -76,6 +70,9 @@ class SensorModel:
     """Turn a path, block by block, into what a sensor publishes; what lies between the blocks is continuous."""
 
     PATH_RATE_HZ: float  # points of the path a second
+    UNIT_PER_COUNT: ClassVar[
+        Mapping[str, float]
+    ] = {}  # by topic, where the driver publishes another unit than the device sends
 
     def __init__(
         self,
@@ -92,13 +89,16 @@ class SensorModel:
         self._converter = partial(Converter, scene, rng, batch_shape=batch_shape)
         self._filter = partial(Filter, settled=settled)
 
-    def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
-        """Return samples by topic, (..., n_samples, n_channels) in the unit the driver publishes."""
+    def measure(self, path: Trajectory, *, slow: bool = True) -> dict[str, Samples]:
+        """Return what the device sends along the next section of path, by topic, (..., n_samples, n_channels)."""
         raise NotImplementedError
 
-    def advance(self, path: Trajectory) -> Any:
-        """Return what the emulated device takes along the next section of path: whole numbers, or values in units."""
-        raise NotImplementedError
+    def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
+        """Return the same in the units that the driver publishes."""
+        measured = self.measure(path, slow=slow)
+        for topic in measured.keys() & self.UNIT_PER_COUNT.keys():
+            measured[topic] = self.UNIT_PER_COUNT[topic] * measured[topic]
+        return measured
 
     def _pressed_n(self, path: Trajectory) -> tuple[Trajectory, Array]:
         """Return where the skin goes, and the force on it there, (..., n)."""
@@ -189,22 +189,12 @@ class BioTacModel(SensorModel):
         self._fast = convert(layout.pac_rate_hz, 1)
         self._slow = convert(layout.frame_rate_hz, len(layout.slow_slots), slow=True)
 
-    def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
+    def measure(self, path: Trajectory, *, slow: bool = True) -> dict[str, Samples]:
         """Return PAC, and the slow channels if wanted, in counts."""
         placed, pressed_n = self._pressed_n(path)
         pressure_pa = PA_PER_N * pressed_n  # in the fluid
         fast = {'signal': self._fast.exact(self._pac(pressure_pa))}
         return {**fast, 'signal_static': self._slow.exact(self._frames(placed, pressure_pa))} if slow else fast
-
-    def advance(self, path: Trajectory) -> NDArray[np.uint16]:
-        """Return what is measured along the next section of path."""
-        streams = self.streams(path)
-        frames = streams['signal_static']
-        counts = np.empty((*frames.shape[:-1], len(self._layout.slots)), dtype=np.uint16)
-        pac = [channel == PAC for channel in self._layout.slots]
-        counts[..., pac] = streams['signal'].reshape(*frames.shape[:-1], self._layout.pac_per_frame)
-        counts[..., list(self._layout.slow_slots)] = frames
-        return counts
 
     def _pac(self, pressure_pa: Array) -> Samples:
         """Return PAC, (..., n_samples, 1) counts."""
@@ -289,6 +279,7 @@ class DaqModel(SensorModel):
     """Turn a path, block by block, into the converter's counts; see `SensorModel` for the arguments."""
 
     PATH_RATE_HZ = DAQ_PATH_RATE_HZ
+    UNIT_PER_COUNT: ClassVar = {daq.TOPIC: VOLT_PER_COUNT}
 
     def __init__(self, *touched: Any, **individual: Any) -> None:
         super().__init__(*touched, **individual)
@@ -296,20 +287,14 @@ class DaqModel(SensorModel):
         self._leak, self._band = self._filter(DAQ_LEAK), self._filter(DAQ_BAND)
         self._counts = self._converter(DAQ_RATE_HZ, ELEMENTS, DAQ_LIMITS)
 
-    def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
-        """Return the 8 channels in V, (..., n_samples, 8)."""
-        return {daq.TOPIC: VOLT_PER_COUNT * self._counts.exact(self._exact(path))}
-
-    def advance(self, path: Trajectory) -> NDArray[np.int16]:
-        """Return what is measured along the next section of path."""
-        return self._counts.counts(self._exact(path), np.int16)
-
-    def _exact(self, path: Trajectory) -> Samples:
+    def measure(self, path: Trajectory, *, slow: bool = True) -> dict[str, Samples]:
+        """Return the 8 channels in counts, (..., n_samples, 8)."""
         placed = self.touch.placed(path)
         # The force that each element senses, (..., 8, n).
         pressed_n = placed.force_n[..., None, :] + self.touch.variation_n(placed, DAQ_BLUR_M, self._offset_m)
         pressed_n[..., :FILMS, :] = self._leak(pressed_n[..., :FILMS, :])
-        return np.swapaxes(self._band(pressed_n), -1, -2) * (self.volt_per_n / VOLT_PER_COUNT)
+        counts = np.swapaxes(self._band(pressed_n), -1, -2) * (self.volt_per_n / VOLT_PER_COUNT)
+        return {daq.TOPIC: self._counts.exact(counts)}
 
 
 @lru_cache(maxsize=16)
@@ -329,61 +314,10 @@ DAQ_KIND = SensorKind(
 
 
 # --------------------
-# Forces on the elements of a finger with a slow array: normal and tangential, along a path.
-
-FRICTION = 0.5  # fraction of the normal force that drags the skin while it slides
-CREEP_M_S = 1e-3  # speed at which half of that is reached
-CROSSTALK = 0.1  # standard deviation of what an axis of an element senses of another one
-REACH_M = 5e-3  # distance from the middle at which an element bears e^-0.5 of the load of the middle
-
-
-class PressedElements:
-    """Return what each element senses of the force on the skin.
-
-    The force spreads over the elements like a bell; each senses its part, blurred by its depth; its axes are not
-    quite at right angles. All these numbers are ours.
-    """
-
-    def __init__(self, places_m: Sequence[tuple[float, float]], blur_m: float, rate_hz: float, finger: int) -> None:
-        made = individual_rng(finger)
-        x_m, y_m = np.array(places_m).T
-        self._offset_m = x_m[:, None], y_m[:, None]
-        self._blur_m = np.full((len(x_m), 1), blur_m)
-        self._rate_hz = rate_hz
-        fraction = np.exp(-0.5 * (x_m**2 + y_m**2) / REACH_M**2)
-        self._fraction = (fraction / fraction.sum())[:, None]
-        self._coupling: Array = np.eye(3) + CROSSTALK * made.standard_normal((len(x_m), 3, 3))
-        self._before: tuple[Array, Array] | None = None
-
-    def forces_n(self, touch: SkinContact, path: Trajectory) -> Array:
-        """Return the force that each element senses along the next points of a path."""
-        placed = touch.placed(path)
-        pressed_n = placed.force_n[..., None, :] + touch.variation_n(placed, self._blur_m, self._offset_m)
-        normal_n = self._fraction * pressed_n
-        x, y = self._drag_directions(placed)
-        forces_n = np.stack([x[..., None, :] * normal_n, y[..., None, :] * normal_n, normal_n], axis=-2)
-        return np.asarray(self._coupling @ forces_n)
-
-    def _drag_directions(self, placed: Trajectory) -> tuple[Array, Array]:
-        """Return the fraction of the normal force that drags along x and y, (..., n) each."""
-        x_m, y_m = self._before or before_first(placed)
-        self._before = placed.x_m[..., -1:], placed.y_m[..., -1:]
-        x_m_s = self._rate_hz * np.diff(placed.x_m, prepend=x_m)
-        y_m_s = self._rate_hz * np.diff(placed.y_m, prepend=y_m)
-        scale = FRICTION / (np.hypot(x_m_s, y_m_s) + CREEP_M_S)
-        return scale * x_m_s, scale * y_m_s
-
-
-def as_samples(forces_n: Array) -> Samples:
-    """Return the forces on elements, (..., n_elements, 3, n), as samples of their axes, (..., n, 3 · n_elements)."""
-    return np.swapaxes(forces_n.reshape(*forces_n.shape[:-3], -1, forces_n.shape[-1]), -1, -2)
-
-
-# --------------------
 # What an AnySkin measures while it goes along a path: the field of its magnetic skin at five magnetometers.
 #
-# Where the skin is pressed and dragged the field changes in proportion to the force. The microtesla per newton, the
-# field without load and the bandwidth of the skin are ours: none are published.
+# Where the skin is pressed and dragged the field changes in proportion to the force, which spreads over the
+# magnetometers like a bell; their axes are not quite at right angles. All numbers are ours: none are published.
 
 ANYSKIN_RATE_HZ = anyskin.USUAL_RATE_HZ
 ANYSKIN_OVERSAMPLING = 10
@@ -392,6 +326,10 @@ SPACING_M = 5e-3
 ANYSKIN_PLACES_M = ((0.0, 0.0), (SPACING_M, 0.0), (-SPACING_M, 0.0), (0.0, SPACING_M), (0.0, -SPACING_M))
 ANYSKIN_BLUR_M = 4e-4
 ANYSKIN_BAND = filters.butter(4, 40.0, 'lowpass', fs=ANYSKIN_PATH_RATE_HZ, output='sos')
+FRICTION = 0.5  # fraction of the normal force that drags the skin while it slides
+CREEP_M_S = 1e-3  # speed at which half of that is reached
+CROSSTALK = 0.1  # standard deviation of what an axis of a magnetometer senses of another one
+REACH_M = 5e-3  # distance from the middle at which a magnetometer senses e^-0.5 of the load of the middle
 UT_PER_N = 600.0
 UNLOADED_UT = 1500.0  # each axis of the field without load lies within plus and minus this
 UT_PER_COUNT = 0.15
@@ -408,21 +346,40 @@ class AnySkinModel(SensorModel):
 
     def __init__(self, *touched: Any, **individual: Any) -> None:
         super().__init__(*touched, **individual)
-        self._elements = PressedElements(ANYSKIN_PLACES_M, ANYSKIN_BLUR_M, self.PATH_RATE_HZ, self._finger)
+        x_m, y_m = np.array(ANYSKIN_PLACES_M).T
+        self._offset_m = x_m[:, None], y_m[:, None]
+        fraction = np.exp(-0.5 * (x_m**2 + y_m**2) / REACH_M**2)
+        self._fraction = (fraction / fraction.sum())[:, None]
+        made = individual_rng(self._finger)
+        self._coupling: Array = np.eye(3) + CROSSTALK * made.standard_normal((len(x_m), 3, 3))
+        self._before: tuple[Array, Array] | None = None
         self._band = self._filter(ANYSKIN_BAND)
         channels = 3 * len(ANYSKIN_PLACES_M)
         self._unloaded_ut = individual_rng(self._finger).uniform(-UNLOADED_UT, UNLOADED_UT, channels)
         self._counts = self._converter(ANYSKIN_RATE_HZ, channels, ANYSKIN_LIMITS)
 
-    def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
-        """Return the field in µT, (..., n_samples, 15)."""
-        return {anyskin.SIGNAL: self.advance(path)}
+    def measure(self, path: Trajectory, *, slow: bool = True) -> dict[str, Samples]:
+        """Return the field in µT, which the device itself computes, (..., n_samples, 15)."""
+        forces_n = self._band(self._forces_n(path))[..., ANYSKIN_OVERSAMPLING - 1 :: ANYSKIN_OVERSAMPLING]
+        by_channel = np.swapaxes(forces_n.reshape(*forces_n.shape[:-3], -1, forces_n.shape[-1]), -1, -2)
+        counts = self._counts.exact((self._unloaded_ut + UT_PER_N * by_channel) / UT_PER_COUNT)
+        return {anyskin.SIGNAL: UT_PER_COUNT * counts}
 
-    def advance(self, path: Trajectory) -> Array:
-        """Return what is measured along the next section of path."""
-        forces_n = self._band(self._elements.forces_n(self.touch, path))
-        by_channel = as_samples(forces_n[..., ANYSKIN_OVERSAMPLING - 1 :: ANYSKIN_OVERSAMPLING])
-        return UT_PER_COUNT * self._counts.exact((self._unloaded_ut + UT_PER_N * by_channel) / UT_PER_COUNT)
+    def _forces_n(self, path: Trajectory) -> Array:
+        """Return the force that each magnetometer senses along the next points, (..., n_magnetometers, 3, n)."""
+        placed = self.touch.placed(path)
+        blur_m = np.full_like(self._offset_m[0], ANYSKIN_BLUR_M)
+        pressed_n = placed.force_n[..., None, :] + self.touch.variation_n(placed, blur_m, self._offset_m)
+        normal_n = self._fraction * pressed_n
+        # A part of the normal force drags the skin the way the finger goes.
+        x_m, y_m = self._before or before_first(placed)
+        self._before = placed.x_m[..., -1:], placed.y_m[..., -1:]
+        x_m_s = self.PATH_RATE_HZ * np.diff(placed.x_m, prepend=x_m)
+        y_m_s = self.PATH_RATE_HZ * np.diff(placed.y_m, prepend=y_m)
+        scale = FRICTION / (np.hypot(x_m_s, y_m_s) + CREEP_M_S)
+        x, y = scale * x_m_s, scale * y_m_s
+        forces_n = np.stack([x[..., None, :] * normal_n, y[..., None, :] * normal_n, normal_n], axis=-2)
+        return np.asarray(self._coupling @ forces_n)
 
 
 ANYSKIN_KIND = SensorKind(
@@ -462,6 +419,7 @@ class PvdfModel(SensorModel):
     """Turn a path, block by block, into the controller's counts; see `SensorModel` for the arguments."""
 
     PATH_RATE_HZ = PVDF_PATH_RATE_HZ
+    UNIT_PER_COUNT: ClassVar = {pvdf.FILM_TOPIC: pvdf.FILM_PC_PER_COUNT, pvdf.FORCE_TOPIC: pvdf.FORCE_N_PER_COUNT}
 
     def __init__(self, *touched: Any, **individual: Any) -> None:
         super().__init__(*touched, **individual)
@@ -470,19 +428,11 @@ class PvdfModel(SensorModel):
         self._fast = self._converter(pvdf.FILM_RATE_HZ, 1, PVDF_LIMITS)
         self._slow = self._converter(pvdf.FORCE_RATE_HZ, 1, PVDF_LIMITS, slow=True)
 
-    def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
-        """Return the charge of the film in pC, and the force in N if wanted, (..., n_samples, 1) each."""
+    def measure(self, path: Trajectory, *, slow: bool = True) -> dict[str, Samples]:
+        """Return the charge of the film, and the force if wanted, in counts, (..., n_samples, 1) each."""
         _, force_n = self._pressed_n(path)
-        fast = {pvdf.FILM_TOPIC: pvdf.FILM_PC_PER_COUNT * self._fast.exact(self._charge(force_n))}
-        if not slow:
-            return fast
-        return {**fast, pvdf.FORCE_TOPIC: pvdf.FORCE_N_PER_COUNT * self._slow.exact(self._force(force_n))}
-
-    def advance(self, path: Trajectory) -> tuple[NDArray[np.int16], NDArray[np.int16]]:
-        """Return what is measured along the next section of path."""
-        _, force_n = self._pressed_n(path)
-        film = self._fast.counts(self._charge(force_n), np.int16)
-        return film[..., 0], self._slow.counts(self._force(force_n), np.int16)[..., 0]
+        fast = {pvdf.FILM_TOPIC: self._fast.exact(self._charge(force_n))}
+        return {**fast, pvdf.FORCE_TOPIC: self._slow.exact(self._force(force_n))} if slow else fast
 
     def _charge(self, force_n: Array) -> Samples:
         """Return the counts of the charge, (..., n_samples, 1)."""
@@ -549,17 +499,11 @@ class Tsf85Model(SensorModel):
         self._fast = self._converter(RATE_HZ, 1, FAST_LIMITS)
         self._slow = self._converter(layout.static_rate_hz, len(rows), SLOW_LIMITS, slow=True)
 
-    def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
+    def measure(self, path: Trajectory, *, slow: bool = True) -> dict[str, Samples]:
         """Return the dynamic channel, and the taxels if wanted, in counts."""
         placed, force_n = self._pressed_n(path)
         fast = {'signal': self._fast.exact(self._dynamic(force_n))}
         return {**fast, 'signal_static': self._slow.exact(self._images(placed))} if slow else fast
-
-    def advance(self, path: Trajectory) -> tuple[NDArray[np.int16], NDArray[np.uint16]]:
-        """Return what is measured along the next section of path."""
-        placed, force_n = self._pressed_n(path)
-        dynamic = self._fast.counts(self._dynamic(force_n), np.int16)
-        return dynamic[..., 0], self._slow.counts(self._images(placed), np.uint16)
 
     def _dynamic(self, force_n: Array) -> Samples:
         before = force_n[..., :1] if self._force_before_n is None else self._force_before_n
@@ -620,63 +564,3 @@ SENSORS: Mapping[str, SensorKind] = {
     'pvdf': PVDF_KIND,  # film at 4096 Hz with leaking charge, force at 64 Hz
     'anyskin': ANYSKIN_KIND,  # field at 5 magnetometers, 100 Hz
 }
-
-
-# --------------------
-# Fingers that slide together, each an individual that touches a separate place.
-
-
-class JoinedContacts:
-    """The contacts of fingers that touch one surface, as one."""
-
-    def __init__(self, contacts: Sequence[SkinContact]) -> None:
-        self._contacts = contacts
-
-    @property
-    def surface(self) -> Surface:
-        """What is touched."""
-        return self._contacts[0].surface
-
-    @surface.setter
-    def surface(self, surface: Surface) -> None:
-        for contact in self._contacts:
-            contact.surface = surface
-
-    def relocate(self) -> None:
-        """Let each finger touch another place from now on."""
-        for contact in self._contacts:
-            contact.relocate()
-
-
-class JoinedFingers:
-    """The models of fingers that move as one."""
-
-    def __init__(self, models: Sequence[SensorModel], join: Callable[[Sequence[Any]], Any]) -> None:
-        self._models = models
-        self._join = join
-        self.touch = JoinedContacts([model.touch for model in models])
-
-    def advance(self, path: Trajectory) -> Any:
-        """Return what all measure along the next section of path."""
-        return self._join([model.advance(path) for model in self._models])
-
-
-def tsf85_pair(scene: Scene, surface: Surface, rng: np.random.Generator) -> JoinedFingers:
-    """Return two fingers of a TSF-85: they measure (n_samples, 2) and (n_images, 2, n_taxels) counts."""
-    models = [Tsf85Model(scene.of_finger(finger), surface, rng, finger=finger) for finger in (0, 1)]
-    return JoinedFingers(models, _join_pair)
-
-
-def _join_pair(measured: Sequence[tuple[NDArray[np.int16], NDArray[np.uint16]]]) -> tuple[Any, Any]:
-    dynamic, images = zip(*measured, strict=True)
-    return np.stack(dynamic, axis=-1), np.stack(images, axis=1)
-
-
-SERIALS = ('BT-0', 'BT-1', 'BT-2')  # by place
-
-
-def biotac_hand(scene: Scene, surface: Surface, rng: np.random.Generator, places: int = len(SERIALS)) -> JoinedFingers:
-    """Return BioTacs on one board: they measure (n_frames, n_slots, n_places) counts."""
-    make = SENSORS['biotac'].make
-    models = [make(scene.of_finger(place), surface, rng, finger=place) for place in range(places)]
-    return JoinedFingers(models, partial(np.stack, axis=-1))

@@ -215,11 +215,7 @@ class Grid(Cut):
         high=0.1,
     )
     pitch_y_m: float = param(
-        2e-3,
-        'Distance of posts along the second direction, across the first one.',
-        unit='m',
-        low=1e-5,
-        high=0.1,
+        2e-3, 'Distance of posts along the second direction, across the first one.', unit='m', low=1e-5, high=0.1
     )
     angle_rad: float = param(0.0, 'First direction, from +x towards +y.', unit='rad', low=-math.pi, high=math.pi)
     relief: str = param('posts', "Raised part: 'posts', or a 'net' of ribs between hollows.", choices=('posts', 'net'))
@@ -397,13 +393,7 @@ class Sandpaper(RandomRelief):
     grain_m: float = param(
         2e-4, 'Diameter of a grain; a larger grain gives lower frequencies.', unit='m', low=2e-5, high=0.01
     )
-    grain_height_m: float = param(
-        5e-5,
-        'Mean height of a grain above the sheet.',
-        unit='m',
-        low=0.0,
-        high=0.005,
-    )
+    grain_height_m: float = param(5e-5, 'Mean height of a grain above the sheet.', unit='m', low=0.0, high=0.005)
     cover: float = param(0.5, 'Fraction of the sheet that lies under grains.', low=0.02, high=2.0)
 
     @property
@@ -435,13 +425,7 @@ class SelfAffine(RandomRelief):
     Along any line its power falls as 1/f^s with s = 1 + 2·hurst.
     """
 
-    rms_m: float = param(
-        1e-5,
-        'Standard deviation of the height.',
-        unit='m',
-        low=0.0,
-        high=1e-3,
-    )
+    rms_m: float = param(1e-5, 'Standard deviation of the height.', unit='m', low=0.0, high=1e-3)
     hurst: float = param(0.8, 'Hurst exponent: 1 is smooth on small scales, 0 is jagged.', low=0.0, high=1.0)
     longest_m: float = param(6e-3, 'Longest wavelength of the relief.', unit='m', low=1e-4, high=0.1)
     shortest_m: float = param(4e-4, 'Shortest wavelength of the relief.', unit='m', low=1e-5, high=0.01)
@@ -502,18 +486,10 @@ class Weave(Seeded):
         high=0.05,
     )
     thickness_x_m: float = param(
-        1e-4,
-        'Height of the yarns that a slide along x crosses.',
-        unit='m',
-        low=0.0,
-        high=0.01,
+        1e-4, 'Height of the yarns that a slide along x crosses.', unit='m', low=0.0, high=0.01
     )
     thickness_y_m: float = param(
-        1e-4,
-        'Height of the yarns that a slide along y crosses.',
-        unit='m',
-        low=0.0,
-        high=0.01,
+        1e-4, 'Height of the yarns that a slide along y crosses.', unit='m', low=0.0, high=0.01
     )
     repeat: int = param(
         2, 'Number of yarns after which the weave repeats: 2 is plain, more is a twill.', low=2, high=12

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -36,7 +35,7 @@ from texture_drivers.catalogue import SENSORS
 from texture_drivers.health import ChannelWatch, SensorHealth, TareParams
 from texture_drivers.sensor import SensorParams, SensorReader
 
-TARE_POLL_S, TARE_LATE_S = 0.02, 5.0  # how often a tare is looked at, and how much longer it may take with a bias
+TARE_POLL_S, TARE_LATE_S = 0.02, 5.0  # how often a tare is looked at, and how much longer its samples may take
 
 # A signal of this name is published as sensor_msgs/Imu too, on imu/data_raw as REP-145 has it, while anyone listens.
 IMU_SIGNAL = 'signal_imu'
@@ -165,9 +164,10 @@ class SensorNode(PatientLifecycleNode):
             cause = 'the sensor delivers no samples; see its message on /diagnostics'
             response.message = cause if reader else 'the sensor node is not active; activate it'
             return response
-        before, begun = watch.baselines, self._start_tare()
+        before = watch.baselines
+        watch.start_tare()
         end_s = time.monotonic() + self._tare_s + TARE_LATE_S
-        while time.monotonic() < end_s and (watch.taring or not begun.is_set()):
+        while time.monotonic() < end_s and watch.taring:
             time.sleep(TARE_POLL_S)
         missing = [topic for topic, baseline in watch.baselines.items() if baseline is before[topic]]
         response.success = not missing
@@ -180,25 +180,11 @@ class SensorNode(PatientLifecycleNode):
 
     def _on_exploration(self, state: msg.ExplorationState) -> None:
         if self._reader is not None:
-            self._watch.set_unloaded(state.phase in UNLOADED)
-
-    def _start_tare(self) -> threading.Event:
-        """Let the device remove its bias, if any, and then measure the rest; return the event of its start."""
-        sensor, watch, begun = self._sensor, self._watch, threading.Event()
-
-        def start() -> None:
-            watch.start_tare(getattr(sensor, 'set_bias', lambda: 0.0)())
-            begun.set()
-
-        if self._reader is not None:
-            self._reader.between_reads(start)
-        return begun
+            self._watch.unloaded = state.phase in UNLOADED
 
     def _report(self) -> tuple[str, str, dict[str, Any]]:
         if self._reader is None:
             return 'WARN', 'the sensor is not active', {}
-        if self._watch.needs_tare:
-            self._start_tare()
         self._diagnostics.hardware_id = self._health.details.get('serial number', self._device)
         return self._health.report(time.monotonic())
 

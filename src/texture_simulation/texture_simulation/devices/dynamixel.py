@@ -82,15 +82,12 @@ class DynamixelMotors:
         ids: list[int],
         pressing: Mapping[int, PressingMotor],
         stiffness_n_m: float = 2000.0,
-        model: int = XC330_M288,
-        watchdog_stops: bool = True,
     ) -> None:
         self.ids = ids
         self.absent: set[int] = set()  # cable out
         self.held: set[int] = set()  # something holds them where they are
         self.twice: set[int] = set()  # two motors with this id, whose answers collide
         self.stiffness_n_m = stiffness_n_m
-        self._watchdog_stops = watchdog_stops
         self._silence_s = 0.0  # since the last instruction packet, in the time of the mechanics
         self._starting_s: dict[int, float] = {}  # motors that reboot, and for how much longer
         self.tables = {motor: bytearray(256) for motor in ids}
@@ -101,7 +98,7 @@ class DynamixelMotors:
         self._lever = np.array([pressing[motor].lever_m if motor in pressing else 0.0 for motor in ids])
         self._height = np.array([pressing[motor].height_m if motor in pressing else 1.0 for motor in ids])
         for motor in ids:
-            struct.pack_into('<H', self.tables[motor], 0, model)
+            struct.pack_into('<H', self.tables[motor], 0, XC330_M288)
             self.tables[motor][6] = 52  # firmware
             self.tables[motor][MODE] = POSITION_MODE
             self.tables[motor][SHUTDOWN] = SHUTDOWN_BITS
@@ -217,8 +214,7 @@ class DynamixelMotors:
             armed = table[TORQUE] and 0 < table[WATCHDOG] <= MAX_WATCHDOG
             if armed and self._silence_s > table[WATCHDOG] * WATCHDOG_UNIT_S:
                 table[WATCHDOG] = TRIPPED
-                if self._watchdog_stops:
-                    table[GOAL_POSITION : GOAL_POSITION + 4] = table[PRESENT + 6 : PRESENT + 10]
+                table[GOAL_POSITION : GOAL_POSITION + 4] = table[PRESENT + 6 : PRESENT + 10]
 
     def _clear_memory(self, motor: int) -> None:
         """Give what is not in the EEPROM the values with which a motor starts."""

@@ -12,7 +12,7 @@ import struct
 import tty
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -209,6 +209,10 @@ def _point_link(link: Path, target: str) -> None:
 # What all emulated sensor devices have in common: they can be plugged, and the same can go wrong with them.
 
 
+# What fingers have measured since the last time, by topic, (n_samples, n_channels, n_fingers).
+Measured = Mapping[str, NDArray[Any]]
+
+
 class EmulatedDevice:
     """An emulated device on a pseudo-terminal.
 
@@ -254,8 +258,8 @@ class EmulatedDevice:
         """Begin clock and numbers again, as after a brown-out."""
         self._held_back = b''
 
-    def measure(self, measured: Any) -> None:
-        """Send what a model has measured."""
+    def measure(self, measured: Measured) -> None:
+        """Send what the fingers have measured."""
         raise NotImplementedError
 
     def skip(self, steps: int) -> None:
@@ -289,10 +293,11 @@ TEMPERATURE_C = 31.25
 class EmulatedAnySkin(EmulatedDevice):
     """An emulated board: it sends from the moment it is plugged in. See `EmulatedDevice`."""
 
-    def measure(self, measured: Array) -> None:
-        """Send the field, (n_samples, 15) µT."""
+    def measure(self, measured: Measured) -> None:
+        """Send the field, (n_samples, 15, 1) µT."""
+        field_ut = measured['signal'][:, :, 0]
         # With the wrong firmware it is a board with fewer magnetometers.
-        self._send(self._disturbed(encode(measured[:, 3:] if self.wrong_firmware else measured)))
+        self._send(self._disturbed(encode(field_ut[:, 3:] if self.wrong_firmware else field_ut)))
 
     def skip(self, steps: int) -> None:
         """Let time pass without sending: the board does not number its frames."""
@@ -315,7 +320,7 @@ WRONG_VERSION = 99
 
 
 class EmulatedBioTac(EmulatedDevice):
-    """An emulated bridge: `measure` takes the frames that have been sampled."""
+    """An emulated bridge; see `EmulatedDevice`."""
 
     def __init__(
         self, link: Path, rng: np.random.Generator, serials: Sequence[str] = ('BT-2P-02.2.0-B-11-E-00-04',)
@@ -335,10 +340,15 @@ class EmulatedBioTac(EmulatedDevice):
         """Let time pass without sending: frames are lost."""
         self._frames += steps
 
-    def measure(self, measured: Values) -> None:
-        """Send frames, (n_frames, n_slots, n_places)."""
-        replies = self._disturb(encode_replies(measured, self._absent))
-        self._send(b''.join(self._sent(frame, reply.tobytes()) for frame, reply in zip(measured, replies, strict=True)))
+    def measure(self, measured: Measured) -> None:
+        """Send frames: PAC of every second slot, (n_frames * n_pac, 1, n_places), and TDC, TAC, PDC, the electrodes."""
+        slow = measured['signal_static']
+        n_frames, n_slow, n_places = slow.shape
+        values = np.empty((n_frames, 2 * n_slow, n_places), dtype=np.uint16)
+        values[:, ::2] = np.concatenate([slow[:, 3:], slow[:, 2::-1]], axis=1)
+        values[:, 1::2] = measured['signal'].reshape(n_frames, n_slow, n_places)
+        replies = self._disturb(encode_replies(values, self._absent))
+        self._send(b''.join(self._sent(frame, reply.tobytes()) for frame, reply in zip(values, replies, strict=True)))
 
     def _sent(self, values: Values, reply: bytes) -> bytes:
         """Return the bytes that one frame becomes."""
@@ -377,36 +387,34 @@ class SampledStream(NamedTuple):
 
 
 class EmulatedSampler(EmulatedDevice):
-    """An emulated device: `advance` it by what has been sampled."""
+    """An emulated device that sends one kind of frames for each topic; see `EmulatedDevice`."""
 
-    def __init__(
-        self, link: Path, rng: np.random.Generator, streams: Mapping[str, SampledStream], start_us: int = 0
-    ) -> None:
+    STREAMS: ClassVar[Mapping[str, SampledStream]]  # by topic, the fastest first
+
+    def __init__(self, link: Path, rng: np.random.Generator) -> None:
         super().__init__(link, rng)
-        self._start_us = start_us
-        self._streams = streams
         self.reset()
 
     def reset(self) -> None:
         """Begin numbers and clock again, as after a brown-out."""
         super().reset()
-        self._frames = dict.fromkeys(self._streams, 0)
+        self._frames = dict.fromkeys(self.STREAMS, 0)
         self._waiting: dict[str, Counts] = {
-            name: np.empty((0, stream.columns), dtype=np.int16) for name, stream in self._streams.items()
+            name: np.empty((0, stream.columns), dtype=np.int16) for name, stream in self.STREAMS.items()
         }
 
     def skip(self, steps: int) -> None:
         """Let time pass, in samples of the first stream, without sending: whole frames are lost."""
-        first = next(iter(self._streams.values()))
-        for name, stream in self._streams.items():
+        first = next(iter(self.STREAMS.values()))
+        for name, stream in self.STREAMS.items():
             self._frames[name] += round(steps / first.rate_hz * stream.rate_hz / stream.rows)
 
-    def advance(self, samples: Mapping[str, Counts]) -> None:
-        """Sample, and send what fills a frame."""
+    def measure(self, measured: Measured) -> None:
+        """Send what fills a frame."""
         data = b''
-        for name, counts in samples.items():
-            self._waiting[name] = np.concatenate([self._waiting[name], counts])
-            rows = self._streams[name].rows
+        for name, counts in measured.items():
+            self._waiting[name] = np.concatenate([self._waiting[name], counts[:, :, 0].astype(np.int16)])
+            rows = self.STREAMS[name].rows
             while len(self._waiting[name]) >= rows:
                 data += self._sent(name, self._waiting[name][:rows])
                 self._waiting[name] = self._waiting[name][rows:]
@@ -414,9 +422,9 @@ class EmulatedSampler(EmulatedDevice):
 
     def _sent(self, name: str, counts: Counts) -> bytes:
         """Return the bytes that one frame becomes."""
-        stream, number = self._streams[name], self._frames[name]
+        stream, number = self.STREAMS[name], self._frames[name]
         self._frames[name] += 1
-        time_us = self._start_us + round(number * stream.rows * MICROSECONDS / stream.rate_hz)
+        time_us = round(number * stream.rows * MICROSECONDS / stream.rate_hz)
         data = encode_samples(stream, number, time_us, counts, WRONG_VERSION if self.wrong_firmware else VERSION)
         return self.frame_faults.apply(data, self._rng)
 
@@ -426,42 +434,19 @@ def encode_samples(stream: SampledStream, number: int, time_us: int, counts: Cou
     return framed(stream.kind, version, number, time_us, shape=counts.shape, body=counts.astype('<i2').tobytes())
 
 
-# --------------------
-# The converter of the data acquisition finger on a pseudo-terminal.
-
-STREAM = SampledStream(kind=0x01, rate_hz=2500.0, columns=8, rows=10)  # 250 frames of 174 bytes a second
-
-
 class EmulatedDaq(EmulatedSampler):
-    """Eight channels at 2.5 kHz; see `EmulatedSampler`."""
+    """The converter of the data acquisition finger: eight channels, 250 frames of 174 bytes a second."""
 
-    def __init__(
-        self, link: Path, rng: np.random.Generator, start_us: int = 0, rate_hz: float = STREAM.rate_hz
-    ) -> None:
-        super().__init__(link, rng, {'daq': STREAM._replace(rate_hz=rate_hz)}, start_us)
-
-    def measure(self, measured: Counts) -> None:
-        """Send samples, (n_samples, 8)."""
-        self.advance({'daq': measured})
-
-
-# --------------------
-# The microcontroller of the PVDF finger on a pseudo-terminal.
-
-FILM = SampledStream(kind=0x10, rate_hz=4096.0, columns=1, rows=32)  # 128 frames of 78 bytes a second
-FORCE = SampledStream(kind=0x11, rate_hz=64.0, columns=1, rows=1)  # 64 frames of 16 bytes a second
+    STREAMS: ClassVar = {'signal': SampledStream(kind=0x01, rate_hz=2500.0, columns=8, rows=10)}
 
 
 class EmulatedPvdf(EmulatedSampler):
-    """Film at 4096 Hz and force at 64 Hz; see `EmulatedSampler`."""
+    """The microcontroller of the PVDF finger: 128 frames of 78 bytes of the film, 64 of 16 bytes of the force."""
 
-    def __init__(self, link: Path, rng: np.random.Generator, start_us: int = 0) -> None:
-        super().__init__(link, rng, {'film': FILM, 'force': FORCE}, start_us)
-
-    def measure(self, measured: tuple[Counts, Counts]) -> None:
-        """Send samples of the film, (n_film,), and of the force, (n_force,)."""
-        film, force = measured
-        self.advance({'film': film[:, None], 'force': force[:, None]})
+    STREAMS: ClassVar = {
+        'signal': SampledStream(kind=0x10, rate_hz=4096.0, columns=1, rows=32),
+        'signal_static': SampledStream(kind=0x11, rate_hz=64.0, columns=1, rows=1),
+    }
 
 
 # --------------------
@@ -504,23 +489,23 @@ class Tsf85Encoder:
         return bytes([0x9A, 0x00, 0x58, len(items)]) + items
 
     def packets(self, first_ms: int, dynamic: Counts, image: Image, image_is_new: bool) -> Iterator[bytes]:
-        """Yield the packets of some milliseconds."""
+        """Yield the packets of some milliseconds, of (n, n_fingers) values and an (n_taxels, n_fingers) image."""
         rows = np.tile(self._template, (len(dynamic), 1))
         stamps = (first_ms + np.arange(len(dynamic))).astype(self._stamp_type)  # 16 bits wrap, as they do in the device
         rows[:, self._stamp_at] = stamps[:, None].view(np.uint8)
         for finger, counts in self._by_finger(dynamic.T):
             at = self._stamp_at.stop + self._present.index(finger) * 17 + 1
             rows[:, at : at + 2] = counts.astype('>i2')[:, None].view(np.uint8)
-        images = [_image_packet(finger, taxels) for finger, taxels in self._by_finger(image)]
+        images = [_image_packet(finger, taxels) for finger, taxels in self._by_finger(image.T)]
         for number, row in enumerate(rows):
             if not self._long_stamps or (image_is_new and number == 0):
                 yield from images
             yield row.tobytes()
 
     def _by_finger(self, values: NDArray[Any]) -> Iterator[tuple[int, NDArray[Any]]]:
-        """Yield finger and values of each that senses and is plugged in, (n,) or (2, n)."""
-        each = [(self._finger, values)] if values.ndim == 1 else enumerate(values)
-        yield from ((finger, row) for finger, row in each if self._plugged[finger])
+        """Yield finger and values, (n,), of each that senses and is plugged in."""
+        first = self._finger if len(values) == 1 else 0
+        yield from ((finger, row) for finger, row in enumerate(values, first) if self._plugged[finger])
 
     @property
     def _present(self) -> list[int]:
@@ -540,7 +525,7 @@ UNKNOWN_ITEM = b'\x80'  # no type that any firmware known sends
 
 
 class EmulatedTsf85(EmulatedDevice):
-    """An emulated sensor: `measure` takes the milliseconds that have passed."""
+    """An emulated hub; see `EmulatedDevice`."""
 
     def __init__(self, link: Path, rng: np.random.Generator) -> None:
         super().__init__(link, rng)
@@ -549,7 +534,7 @@ class EmulatedTsf85(EmulatedDevice):
         self._encoder = Tsf85Encoder()
         self._received = b''
         self._clock_ms = 0
-        self._image: Image = np.zeros(TAXELS, dtype=np.uint16)
+        self._image: Image = np.zeros((TAXELS, 1), dtype=np.uint16)
         self._image_is_new = False
 
     @property
@@ -567,9 +552,9 @@ class EmulatedTsf85(EmulatedDevice):
         """Pull the plugs of fingers, or plug them in again, one flag a finger; the hub stays on its line."""
         self._encoder.plug(plugged)
 
-    def measure(self, measured: tuple[Counts, Image]) -> None:
+    def measure(self, measured: Measured) -> None:
         """Let as many milliseconds pass as there are dynamic values, and send them and the newest image if started."""
-        dynamic, images = measured
+        dynamic, images = measured['signal'][:, 0].astype(np.int16), measured['signal_static'].astype(np.uint16)
         self._execute(self._port.read())
         if len(images):
             self._image, self._image_is_new = images[-1], True

@@ -49,11 +49,7 @@ class ContactParams:
 
     start_height_m: float = param(0.01, 'Height of the finger above the surface at the start.', unit='m', low=0.0)
     stiffness_n_m: float = param(
-        2000.0,
-        'Stiffness of finger and surface in contact; 0 removes the surface.',
-        unit='N/m',
-        low=0.0,
-        high=200000.0,
+        2000.0, 'Stiffness of finger and surface in contact; 0 removes the surface.', unit='N/m', low=0.0, high=200000.0
     )
 
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import dataclasses
 import enum
 import itertools
@@ -19,7 +20,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
@@ -43,20 +43,15 @@ DASHBOARD_PORT = 29999
 SCRIPT_PORT = 30003
 
 
-class ControllerVersion(NamedTuple):
-    """What depends on the version of the control software."""
-
-    numbers: tuple[int, int, int, int]
-    rate_hz: float
-    dashboard: bool  # PolyScope X, version 10, has none
-
-
-VERSIONS: Mapping[str, ControllerVersion] = {
-    '3.15': ControllerVersion((3, 15, 8, 0), 125.0, True),
-    '5.12': ControllerVersion((5, 12, 0, 0), 500.0, True),
-    '5.23': ControllerVersion((5, 23, 0, 0), 500.0, True),
-    '10.10': ControllerVersion((10, 10, 0, 0), 500.0, False),
+# Control software: its version in numbers and its rate. An e-Series; one that RTDE asks for more variables; the older
+# CB3; PolyScope X.
+VERSIONS: Mapping[str, tuple[tuple[int, int, int, int], float]] = {
+    '5.12': ((5, 12, 0, 0), 500.0),
+    '5.23': ((5, 23, 0, 0), 500.0),
+    '3.15': ((3, 15, 8, 0), 125.0),
+    '10.10': ((10, 10, 0, 0), 500.0),
 }
+WITHOUT_DASHBOARD = 10  # PolyScope X has none
 
 
 class RtdeMessage(enum.IntEnum):
@@ -111,7 +106,7 @@ class ScriptCommand(enum.IntEnum):
 
 
 # The script processes these in every cycle and stays ready; the client does not wait for them.
-REALTIME = frozenset({6, 9, 10, 11, 24, 25, 26, 27, 38, 58, 66, 67, 68, 69, 70, 71})
+REALTIME = frozenset({ScriptCommand.FORCE_MODE, ScriptCommand.SPEED_L})
 # What the robot does for some time; a real controller may acknowledge it late.
 SLOW = frozenset({ScriptCommand.SPEED_STOP, ScriptCommand.FORCE_MODE_STOP, ScriptCommand.ZERO_FT_SENSOR})
 READY, DONE = 1, 2  # output_int_register_0
@@ -145,7 +140,7 @@ class UrControllerParams(FingerPipeParams, TouchedSurfaceParams):
 # Poses and velocities are arrays (6,): x, y, z in m, then a rotation vector in rad. Turning is only sketched: rotation
 # vectors change component by component, and 1 rad counts as 1 m.
 
-FRICTION = 0.5  # of the surface, until `emulate friction` sets another
+FRICTION = 0.5  # of the surface
 # Speed per force error, and the lag of the arm behind it. With 2 kN/m the error fades in about 0.1 s, which is of the
 # order of a real arm's.
 ADMITTANCE_M_S_N = 0.01
@@ -194,7 +189,6 @@ class EmulatedRobot:
 
     def __init__(self, params: UrControllerParams, rng: np.random.Generator) -> None:
         self.origin = np.array([params.surface_x_m, params.surface_y_m, params.surface_z_m])
-        self.friction = FRICTION
         self.pose: Array = np.array([*self.origin, 0.0, 0.0, 0.0])
         self.pose[2] += params.start_height_m
         self.velocity: Array = np.zeros(6)
@@ -225,7 +219,7 @@ class EmulatedRobot:
         self.pose = self.pose + velocity * step_s
         # The contact, and what the sensor makes of it.
         from_origin = self.pose[:3] - self.origin
-        self._contact = touch_force_n(self._params, self.friction, np.eye(3), from_origin, velocity[:3])
+        self._contact = touch_force_n(self._params, FRICTION, np.eye(3), from_origin, velocity[:3])
         self.force = self._offset + self._params.force_noise_n * self._rng.standard_normal(6)
         self.force[:3] += self._contact
 
@@ -281,8 +275,8 @@ class EmulatedController:
     """A controller without a clock: each `tick` is one cycle of `step_s`."""
 
     def __init__(self, params: UrControllerParams, rng: np.random.Generator) -> None:
-        self.version = VERSIONS[params.version]
-        self.step_s = 1.0 / self.version.rate_hz
+        self.version, rate_hz = VERSIONS[params.version]
+        self.step_s = 1.0 / rate_hz
         self.time_s = 0.0  # since it was switched on
         whole, real = np.zeros((2, REGISTERS), dtype=np.int64), np.zeros((2, REGISTERS))
         self.registers = Registers(whole[0], real[0], whole[1], real[1])
@@ -439,10 +433,35 @@ class EmulatedController:
 # The sessions: what the ports of dashboard, scripts and RTDE answer.
 
 
-class Session:
+class Session(asyncio.Protocol):
     """One conversation with one client; `greeting` is sent first, `package` unrequested in each cycle."""
 
     greeting = b''
+
+    def __init__(self, controller: EmulatedController, sessions: set[Session]) -> None:
+        self._controller = controller
+        self._sessions = sessions  # all that are open
+        self._coming = self._received = b''
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Greet."""
+        assert isinstance(transport, asyncio.WriteTransport)
+        self.transport = transport
+        self.transport.write(self.greeting)
+        self._sessions.add(self)
+
+    def data_received(self, data: bytes) -> None:
+        """Keep what comes for the next cycle."""
+        self._coming += data
+
+    def connection_lost(self, error: Exception | None) -> None:
+        """Give free what it held."""
+        self._sessions.discard(self)
+
+    def answer(self) -> None:
+        """Take over what has come, and answer."""
+        coming, self._coming = self._coming, b''
+        self.transport.write(self.receive(coming))
 
     def receive(self, data: bytes) -> bytes:
         """Take over what came; return the answer."""
@@ -452,14 +471,11 @@ class Session:
         """Return what is sent unasked in this cycle."""
         return b''
 
-    def close(self) -> None:
-        """Leave nothing behind."""
-
 
 # The dashboard: one line asks, one line answers. Next to the real commands it obeys the fault switches of the emulator:
 # `emulate protective stop`, `emulate silence SECONDS`, in which nothing is answered, `emulate slow SECONDS`,
-# which lets stops, the end of force control and zeroing be acknowledged so much later, `emulate speed SHARE`, as of
-# the slider on the pendant, and `emulate friction COEFFICIENT`, as of another sample under the finger.
+# which lets stops, the end of force control and zeroing be acknowledged so much later, and `emulate speed SHARE`, as of
+# the slider on the pendant.
 # `load NAME` and `play` start a foreign program, which takes no commands.
 
 SERIAL_NUMBER = '20205500001'
@@ -474,17 +490,17 @@ class DashboardSession(Session):
 
     greeting = BANNER
 
-    def __init__(self, controller: EmulatedController, go_silent: Callable[[float], None]) -> None:
-        self._received = b''
-        numbers = '.'.join(str(number) for number in controller.version.numbers)
+    def __init__(
+        self, controller: EmulatedController, sessions: set[Session], go_silent: Callable[[float], None]
+    ) -> None:
+        super().__init__(controller, sessions)
+        numbers = '.'.join(str(number) for number in controller.version)
         # Command: what answers the rest of the line.
         self._answers: Mapping[str, Callable[[str], str]] = {
             'get serial number': lambda _: SERIAL_NUMBER,
-            'get robot model': lambda _: 'UR5',
             'polyscopeversion': lambda _: f'URSoftware {numbers} (emulated)',
             'robotmode': lambda _: 'Robotmode: RUNNING',
             'is in remote control': lambda _: 'true',
-            'safetystatus': lambda _: f'Safetystatus: {controller.safety.name}',
             'safetymode': lambda _: f'Safetymode: {controller.safety.name}',
             'running': lambda _: f'Program running: {str(controller.playing).lower()}',
             'programstate': lambda _: f'{controller.state} {controller.program_name}',
@@ -497,7 +513,6 @@ class DashboardSession(Session):
             'emulate silence': partial(_set, go_silent, 'seconds'),
             'emulate slow': partial(_set, partial(setattr, controller, 'acknowledge_s'), 'seconds'),
             'emulate speed': partial(_set, partial(setattr, controller.robot, 'speed_fraction'), 'shares'),
-            'emulate friction': partial(_set, partial(setattr, controller.robot, 'friction'), 'newtons per N'),
         }
 
     def receive(self, data: bytes) -> bytes:
@@ -529,20 +544,15 @@ def _set(use: Callable[[float], None], unit: str, argument: str) -> str:
     return f'set to {number:g} {unit}'
 
 
-LONGEST_SCRIPT = 1_000_000
 END = b'\nend\n'
 
 
 class ScriptSession(Session):
     """The conversation with one client, which sends programs in URScript and gets no answer."""
 
-    def __init__(self, controller: EmulatedController) -> None:
-        self._controller = controller
-        self._received = b''
-
     def receive(self, data: bytes) -> bytes:
         """Start a program once its last line is there."""
-        self._received = (self._received + data)[-LONGEST_SCRIPT:]
+        self._received += data
         if self._received.endswith(END):
             self._controller.upload(self._received.decode('utf-8', 'replace'))
             self._received = b''
@@ -609,15 +619,11 @@ OUTPUT_RECIPE = 1
 class RtdeSession(Session):
     """The conversation with one client."""
 
-    def __init__(self, controller: EmulatedController, claims: dict[str, RtdeSession]) -> None:
-        self._controller = controller
-        self._claims = claims
-        self._received = b''
+    def __init__(self, controller: EmulatedController, sessions: set[Session]) -> None:
+        super().__init__(controller, sessions)
+        self.inputs: list[list[str]] = []  # its recipes; no other client may write these
         self._outputs: list[Variable] = []
-        self._every_s = controller.step_s
-        self._due_s = 0.0
         self._started = False
-        self._inputs: list[list[str]] = []
 
     def receive(self, data: bytes) -> bytes:
         """Take over what came; return the answers."""
@@ -634,18 +640,11 @@ class RtdeSession(Session):
             answers += _message(kind, answer) if answer else b''
         return answers
 
-    def close(self) -> None:
-        """Give the inputs free."""
-        for name in [name for name, owner in self._claims.items() if owner is self]:
-            del self._claims[name]
-
     def package(self) -> bytes:
-        """Return the data message if one is due, else nothing."""
-        controller = self._controller
-        if not self._started or controller.time_s < self._due_s - 0.5 * controller.step_s:
+        """Return the data message, if they were requested."""
+        if not self._started:
             return b''
-        self._due_s = max(self._due_s + self._every_s, controller.time_s)
-        values = [value for _, read in self._outputs for value in read(controller)]
+        values = [value for _, read in self._outputs for value in read(self._controller)]
         packed = struct.pack(_format(kind for kind, _ in self._outputs), *values)
         return _message(RtdeMessage.DATA, bytes([OUTPUT_RECIPE]) + packed)
 
@@ -654,36 +653,31 @@ class RtdeSession(Session):
         if kind == RtdeMessage.REQUEST_VERSION:
             return bytes([payload == struct.pack('>H', PROTOCOL_VERSION)])
         if kind == RtdeMessage.CONTROLLER_VERSION:
-            return struct.pack('>4I', *self._controller.version.numbers)
+            return struct.pack('>4I', *self._controller.version)
         if kind == RtdeMessage.SETUP_OUTPUTS and len(payload) >= 8:
-            return self._on_setup_outputs(struct.unpack_from('>d', payload)[0], _names(payload[8:]))
+            return self._on_setup_outputs(_names(payload[8:]))  # behind the frequency: data come in each cycle
         if kind == RtdeMessage.SETUP_INPUTS:
             return self._on_setup_inputs(_names(payload))
         if kind in (RtdeMessage.START, RtdeMessage.PAUSE):
             self._started = kind == RtdeMessage.START
             return b'\x01'
-        if kind == RtdeMessage.DATA and payload and 1 <= payload[0] <= len(self._inputs):
-            self._write_inputs(self._inputs[payload[0] - 1], payload[1:])
+        if kind == RtdeMessage.DATA and payload and 1 <= payload[0] <= len(self.inputs):
+            self._write_inputs(self.inputs[payload[0] - 1], payload[1:])
         return b''
 
-    def _on_setup_outputs(self, frequency_hz: float, names: list[str]) -> bytes:
-        self._every_s = max(1.0 / frequency_hz if frequency_hz > 0 else 0.0, self._controller.step_s)
+    def _on_setup_outputs(self, names: list[str]) -> bytes:
         if all(name in OUTPUTS for name in names):
             self._outputs = [OUTPUTS[name] for name in names]
         types = [OUTPUTS[name][0] if name in OUTPUTS else 'NOT_FOUND' for name in names]
         return bytes([OUTPUT_RECIPE]) + ','.join(types).encode()
 
     def _on_setup_inputs(self, names: list[str]) -> bytes:
-        types = [
-            'NOT_FOUND' if name not in INPUTS
-            else INPUTS[name][0] if self._claims.get(name, self) is self
-            else 'IN_USE'
-            for name in names
-        ]  # fmt: skip
+        others = [other for other in self._sessions if isinstance(other, RtdeSession) and other is not self]
+        held = {name for other in others for recipe in other.inputs for name in recipe}
+        types = ['IN_USE' if name in held else INPUTS[name][0] if name in INPUTS else 'NOT_FOUND' for name in names]
         if not {'NOT_FOUND', 'IN_USE'} & set(types):
-            self._claims.update(dict.fromkeys(names, self))
-            self._inputs.append(names)
-        return bytes([len(self._inputs)]) + ','.join(types).encode()
+            self.inputs.append(names)
+        return bytes([len(self.inputs)]) + ','.join(types).encode()
 
     def _write_inputs(self, names: list[str], data: bytes) -> None:
         """Write the values in `data` to inputs; what has another length is not taken."""
@@ -713,104 +707,54 @@ def _format(kinds: Iterable[str]) -> str:
 # --------------------
 # The network of the emulated controller, and its clock.
 #
-# One thread: it sleeps until the next cycle is due, looks what has come, lets the controller do its cycles, and
-# sends.
+# It sleeps until the next cycle is due, looks what has come, lets the controller do its cycles, and sends.
 
 # That are made up for; a process that was held up for longer has lost the time. Meanwhile it hears no commands, and no
 # real controller moves for longer than its watchdog waits without one.
 MAX_MISSED_CYCLES = 50
-CHUNK = 65536
 
 
-class Server:
-    """Serve a controller on its ports."""
+async def serve(controller: EmulatedController, params: UrControllerParams, stopped: Callable[[], bool]) -> None:
+    """Listen on the ports, print 'ready', and serve until `stopped`."""
+    sessions: set[Session] = set()
+    silent_until_ns = 0
 
-    def __init__(self, controller: EmulatedController, ip: str, finger_pipe: str) -> None:
-        self._controller = controller
-        self._sessions: dict[socket.socket, Session] = {}
-        self._listeners: dict[socket.socket, Callable[[], Session]] = {}
-        self._silent_until_ns = 0
-        self._emulator = FingerSender(finger_pipe)
-        claims: dict[str, RtdeSession] = {}
-        self._listen(ip, RTDE_PORT, partial(RtdeSession, controller, claims))
-        self._listen(ip, SCRIPT_PORT, partial(ScriptSession, controller))
-        if controller.version.dashboard:
-            self._listen(ip, DASHBOARD_PORT, partial(DashboardSession, controller, self._go_silent))
+    def go_silent(seconds: float) -> None:
+        nonlocal silent_until_ns
+        silent_until_ns = time.monotonic_ns() + int(seconds * 1e9)
 
-    def run(self, stopped: Callable[[], bool]) -> None:
-        """Serve until `stopped`."""
-        step_ns = round(self._controller.step_s * 1e9)
-        due_ns = time.monotonic_ns()
-        while not stopped():
-            time.sleep(max(0, due_ns - time.monotonic_ns()) * 1e-9)
-            missed = max(0, time.monotonic_ns() - due_ns) // step_ns
-            due_ns += (1 + missed) * step_ns
-            silent = time.monotonic_ns() < self._silent_until_ns
-            if not silent:
-                self._receive()
-            for _ in range(min(missed, MAX_MISSED_CYCLES)):
-                self._controller.catch_up()
-            self._controller.tick()
-            for connection, session in [] if silent else list(self._sessions.items()):
-                self._send(connection, session.package())
-            self._send_state()
-
-    def _listen(self, ip: str, port: int, make_session: Callable[[], Session]) -> None:
-        try:
-            listener = socket.create_server((ip, port), backlog=8)
-        except OSError as error:
-            raise DeviceError(
-                f'the emulated UR controller cannot listen on {ip}:{port}: {error}; give each controller '
-                "a separate loopback address, such as '127.0.0.3'"
-            ) from error
-        listener.setblocking(False)
-        self._listeners[listener] = make_session
-
-    def _go_silent(self, seconds: float) -> None:
-        self._silent_until_ns = time.monotonic_ns() + int(seconds * 1e9)
-
-    def _receive(self) -> None:
-        """Deal with what has come."""
-        ready, _, _ = select.select([*self._listeners, *self._sessions], [], [], 0)
-        for connection in ready:
-            if connection in self._listeners:
-                self._accept(connection)
-                continue
-            try:
-                data = connection.recv(CHUNK)
-            except OSError:
-                data = b''
-            if data:
-                self._send(connection, self._sessions[connection].receive(data))
-            else:
-                self._hang_up(connection)
-
-    def _accept(self, listener: socket.socket) -> None:
-        with suppress(BlockingIOError):
-            connection, _ = listener.accept()
-            connection.setblocking(False)
-            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            session = self._sessions[connection] = self._listeners[listener]()
-            self._send(connection, session.greeting)
-
-    def _send(self, connection: socket.socket, data: bytes) -> None:
-        """Send all of it, or hang up on a client that does not read."""
-        try:
-            sent = connection.send(data) if data else 0
-        except OSError:
-            sent = -1
-        if sent < len(data):
-            self._hang_up(connection)
-
-    def _hang_up(self, connection: socket.socket) -> None:
-        self._sessions.pop(connection).close()
-        connection.close()
-
-    def _send_state(self) -> None:
-        robot = self._controller.robot
+    ports: dict[int, Callable[[], Session]] = {
+        RTDE_PORT: partial(RtdeSession, controller, sessions),
+        SCRIPT_PORT: partial(ScriptSession, controller, sessions),
+    }
+    if controller.version[0] < WITHOUT_DASHBOARD:
+        ports[DASHBOARD_PORT] = partial(DashboardSession, controller, sessions, go_silent)
+    try:
+        for port, make_session in ports.items():
+            await asyncio.get_running_loop().create_server(make_session, params.ip, port)
+    except OSError as error:
+        raise DeviceError(
+            f'the emulated UR controller cannot listen on {params.ip}:{port}: {error}; give each controller '
+            "a separate loopback address, such as '127.0.0.3'"
+        ) from error
+    print('ready', flush=True)
+    emulator, robot = FingerSender(params.finger_pipe), controller.robot
+    step_ns, due_ns = round(controller.step_s * 1e9), time.monotonic_ns()
+    while not stopped():
+        await asyncio.sleep(max(0, due_ns - time.monotonic_ns()) * 1e-9)
+        missed = max(0, time.monotonic_ns() - due_ns) // step_ns
+        due_ns += (1 + missed) * step_ns
+        heard = [] if time.monotonic_ns() < silent_until_ns else list(sessions)
+        for session in heard:
+            session.answer()
+        for _ in range(min(missed, MAX_MISSED_CYCLES)):
+            controller.catch_up()
+        controller.tick()
+        for session in heard:
+            session.transport.write(session.package())
         x, y, z = (robot.pose[:3] - robot.origin).tolist()
         vx, vy, vz = robot.velocity[:3].tolist()
-        self._emulator.send(FingerState(time.monotonic_ns(), x, y, z, vx, vy, vz, robot.pressing_n))
+        emulator.send(FingerState(time.monotonic_ns(), x, y, z, vx, vy, vz, robot.pressing_n))
 
 
 # --------------------
@@ -897,12 +841,10 @@ def main() -> int:
     params = UrControllerParams(**json.loads(sys.argv[1]))
     controller = EmulatedController(params, np.random.default_rng(params.seed))
     try:
-        server = Server(controller, params.ip, params.finger_pipe)
+        asyncio.run(serve(controller, params, lambda: os.getppid() != parent))
     except TextureError as error:
         print(f'emulated UR controller: {error}', file=sys.stderr)
         return 2
-    print('ready', flush=True)
-    server.run(lambda: os.getppid() != parent)
     return 0
 
 

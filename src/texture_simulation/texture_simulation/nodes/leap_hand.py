@@ -23,8 +23,7 @@ class LeapHandParams(FingerPipeParams):
     """Where the motors are reached, what they hold, and which finger senses it."""
 
     link: str = param(
-        f'{DEVICES}/dynamixel',
-        'Path of the symbolic link to the emulated hand, which is the device path of the arm.',
+        f'{DEVICES}/dynamixel', 'Path of the symbolic link to the emulated hand, which is the device path of the arm.'
     )
     finger: str = param('index', 'Finger that carries the tactile sensor.', choices=tuple(LEAP_FINGERS))
 

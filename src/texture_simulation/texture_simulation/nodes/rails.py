@@ -22,8 +22,7 @@ class RailsLinkParams(FingerPipeParams):
     """The device path of the rails, and the receiver of the finger state."""
 
     link: str = param(
-        f'{DEVICES}/rails',
-        'Path of the symbolic link to the emulated rails, which is the device path of the arm.',
+        f'{DEVICES}/rails', 'Path of the symbolic link to the emulated rails, which is the device path of the arm.'
     )
 
 
