@@ -20,8 +20,8 @@ from texture_simulation.effects import (
     PatchGrowth,
     Skids,
     SlideError,
-    Unevenness,
     UnevenMotion,
+    Unevenness,
 )
 from texture_simulation.path import Trajectory
 from texture_simulation.scene import scene_from
