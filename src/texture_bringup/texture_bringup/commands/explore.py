@@ -6,22 +6,34 @@ from __future__ import annotations
 
 import argparse
 import json
+import logging
 import math
+import shutil
+import signal
+import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
-from texture_bringup.nodes.collector import collect_surface, recorder
 from texture_bringup.operator import ExplorationResult, Operator
 from texture_core.cli import USER_ERROR, Command, add_namespace, add_parameters, parameters_from
 from texture_core.config import find
-from texture_core.errors import CollectionError, InvalidParameter, MotionAborted, MotionRefused
+from texture_core.errors import (
+    CollectionError,
+    ExplorationError,
+    InvalidData,
+    InvalidParameter,
+    MotionAborted,
+    MotionRefused,
+)
 from texture_core.types import (
     ExplorationRequest,
     ExplorationState,
@@ -32,10 +44,20 @@ from texture_core.types import (
 from texture_estimation.model import load_model
 from texture_estimation.next_motion import slide_values
 from texture_evaluation.check import adapt_to_today, check_finger, store_reference
-from texture_evaluation.collection import CollectionParams
+from texture_evaluation.collection import (
+    CollectionEnd,
+    CollectionParams,
+    Patch,
+    PlaceAccuracy,
+    PlacePlan,
+    evaluate_places,
+    next_bag,
+)
+from texture_evaluation.collection import collect as collect_places
 from texture_exploration.motions import MOTIONS
 from texture_exploration.presets import load_preset
 from texture_features.correction import read_reference
+from texture_features.feature_set import FeatureSet
 from texture_recordings.dataset import SlideDataset
 
 # Option, field of the request, unit, meaning.
@@ -308,16 +330,103 @@ def motion_text(motion: SlideMotion) -> str:
 
 
 # --------------------
-# Collect slides of a surface; check the finger on the reference plate.
+# Collect slides of a surface.
 
-PLATE = 'reference plate'
-# By option: field of the request, unit, meaning, and default where no reference gives one.
-PLATE_NUMBERS = {
-    'speed': ('speed_m_s', 'm/s', 'speed of the slide', 0.05),
-    'force': ('force_n', 'N', 'normal force, 0 for the default of the motion', 0.0),
-    'distance': ('distance_m', 'm', 'length of the slide', 0.15),
-    'direction': ('direction_rad', 'degrees', 'direction from +x towards +y', 0.0),
-}
+RECIPE = 'default'  # whose features distinguish the places
+RECORDER_S = 30.0  # to start, and to complete the bag
+FLUSHED_S = 20.0  # within which what was recorded can be read: a recorder may be behind
+RECORDED = ('signal', 'exploration')
+PATCH = ('patch_x_low_m', 'patch_x_high_m', 'patch_y_low_m', 'patch_y_high_m')
+LEAST_SPEED_M_S = 0.002  # of every explorer
+LIMITS = ('min_force_n', 'max_force_n', 'max_speed_m_s')
+BAGS_LOG = logging.getLogger('texture_recordings.bags')
+
+
+def collect_surface(
+    operator: Operator, surface: str, folder: Path, params: CollectionParams, namespace: str = ''
+) -> tuple[CollectionEnd, Path | None]:
+    """Collect a surface; return how it ended, and the bag, which is complete however that was, Ctrl-C included.
+
+    A bag without any slide is removed; then None is returned instead.
+    """
+    low_x, high_x, low_y, high_y, low_n, high_n, high_m_s = operator.parameters('explorer', (*PATCH, *LIMITS))
+    if not (low_x < high_x and low_y < high_y):
+        raise InvalidData(
+            'no surface patch is taught: touch the corners of the surface with `texture touch-surface`, or give the '
+            f'explorer {", ".join(PATCH)}'
+        )
+    patch = Patch(low_x, high_x, low_y, high_y)
+    plan = PlacePlan(surface, params, patch, (low_n, high_n), (LEAST_SPEED_M_S, high_m_s))
+    folder.mkdir(parents=True, exist_ok=True)
+    bag = folder / next_bag([one.name for one in folder.iterdir()], surface)
+    with recorder(operator, bag, namespace) as check:
+
+        def explore(request: ExplorationRequest) -> tuple[ExplorationError, str]:
+            check()
+            try:
+                explored = operator.explore(request)
+            except (MotionRefused, MotionAborted) as error:
+                return error.error, str(error)
+            return explored.error, explored.message
+
+        end = collect_places(plan, params, explore, partial(_evaluate_bag, bag, surface), _tell)
+    # Where the recorder has ended, the bag there may be another one.
+    if end.slides or end.error is CollectionError.NOT_RECORDED:
+        return end, bag
+    shutil.rmtree(bag, ignore_errors=True)
+    with suppress(OSError):  # other surfaces are in it
+        folder.rmdir()
+    return replace(end, message=f'{end.message}; no slide was made, so no bag is kept'), None
+
+
+def _tell(sentence: str, slides: int) -> None:
+    print(f'{slides} slides: {sentence}', flush=True)
+
+
+def _evaluate_bag(bag: Path, surface: str, slides: int) -> PlaceAccuracy:
+    """Evaluate all bags of the folder, once the newest one has `slides` slides on the disk."""
+    feature_set = FeatureSet.load(RECIPE)
+    deadline_s = time.monotonic() + FLUSHED_S
+    while True:
+        time.sleep(1.0)
+        BAGS_LOG.disabled = True  # the bag that is still recorded has no end yet
+        try:
+            dataset = SlideDataset.from_bags([bag.parent], topics=feature_set.topics)
+        finally:
+            BAGS_LOG.disabled = False
+        written = sum(one.bag == bag for one in dataset)
+        if written >= slides or time.monotonic() > deadline_s:
+            return evaluate_places(dataset.features(feature_set), surface)
+
+
+@contextmanager
+def recorder(operator: Operator, bag: Path, namespace: str) -> Iterator[Callable[[], None]]:
+    """Record a bag in a separate process; the function raises InvalidData, with its last message, if that ended."""
+    operator.wait_for_listeners(RECORDED, 1, lambda: None)  # the feature extractor; by then all others are found
+    wanted = {topic: operator.listeners(topic) + 1 for topic in RECORDED}
+    command = [sys.executable, '-m', 'texture_bringup.command', 'record', str(bag), '--namespace', namespace]
+    with tempfile.TemporaryFile('w+') as output:
+        process = subprocess.Popen(command, stdout=output, stderr=output, start_new_session=True)
+
+        def last_message() -> str:
+            output.seek(0)
+            return output.read().strip().rpartition('\n')[2]
+
+        def check() -> None:
+            if process.poll() is not None:
+                raise InvalidData(f'the recorder ended: {last_message()}')
+
+        try:
+            for topic, number in wanted.items():
+                operator.wait_for_listeners((topic,), number, check)
+            yield check
+        finally:
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+            try:
+                process.wait(RECORDER_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
 
 
 # Option, lowest and highest of the collection, unit, meaning.
@@ -346,19 +455,25 @@ def _collect(options: argparse.Namespace) -> int:
     params = parameters_from(options, CollectionParams, given)
     with Operator(options.namespace) as operator:
         operator.wait_for_explorer(EXPLORER_S, SOON_S)
-        end, bag = collect_surface(
-            operator,
-            options.surface,
-            options.folder,
-            params,
-            lambda sentence, slides: print(f'{slides} slides: {sentence}', flush=True),
-            namespace=options.namespace,
-        )
+        end, bag = collect_surface(operator, options.surface, options.folder, params, options.namespace)
     kept = f"; {end.slides} slides in '{bag}'" if bag else ''
     print(f'{end.message}{kept}', file=sys.stderr if end.error else sys.stdout)
     if end.error is CollectionError.CANCELLED:
         raise KeyboardInterrupt
     return 0 if end.error is CollectionError.NONE else 1
+
+
+# --------------------
+# Check the finger on the reference plate.
+
+PLATE = 'reference plate'
+# By option: field of the request, unit, meaning, and default where no reference gives one.
+PLATE_NUMBERS = {
+    'speed': ('speed_m_s', 'm/s', 'speed of the slide', 0.05),
+    'force': ('force_n', 'N', 'normal force, 0 for the default of the motion', 0.0),
+    'distance': ('distance_m', 'm', 'length of the slide', 0.15),
+    'direction': ('direction_rad', 'degrees', 'direction from +x towards +y', 0.0),
+}
 
 
 def _configure_check(parser: argparse.ArgumentParser) -> None:
