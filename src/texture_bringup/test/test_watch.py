@@ -59,25 +59,10 @@ def test_a_bag_is_described_by_its_messages_and_slides(bag, capsys):
     assert '1 done' in next(one for one in said.splitlines() if one.strip().startswith('cork'))
 
 
-@pytest.mark.parametrize(
-    ('what', 'named'),
-    [
-        ('sensors', 'tsf85'),
-        ('motions', 'distance_m 0.1'),
-        ('arms', 'rails'),
-        ('recipes', 'default'),
-        ('surfaces', 'glass'),
-    ],
-)
-def test_a_catalogue_is_listed(what, named, capsys):
-    assert main(['list', what]) == 0
-    assert named in capsys.readouterr().out
-
-
 def test_the_machine_is_shown_on_one_screen(capsys):
     assert main(['doctor']) == 0
     names = [one.split('  ')[0] for one in capsys.readouterr().out.splitlines()]
-    assert names == ['system', 'Python', 'ROS', 'DDS', 'serial ports', 'groups', 'dashboard', 'versions']
+    assert names == ['system', 'Python', 'ROS', 'DDS', 'serial ports', 'groups', 'versions']
 
 
 @pytest.mark.parametrize(

@@ -1,26 +1,19 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The sub-commands of `texture` that show catalogues, a bag or a model, and this machine."""
+"""The sub-commands of `texture` that show a bag or a model, and this machine."""
 
 from __future__ import annotations
 
 import argparse
 import grp
-import inspect
 import os
 import platform
-import re
-import socket
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from types import ModuleType
-
-import yaml
 
 from texture_core.cli import Command
-from texture_core.config import find, folder, shipped
 from texture_core.types import NANOSECONDS
 
 # What a command needs is imported when it runs: each looks at other packages.
@@ -34,76 +27,6 @@ def table(rows: Iterable[Row]) -> str:
     rows = list(rows)
     width = max((len(name) for name, _ in rows), default=0)
     return '\n'.join(f'{name:<{width}}  {text}'.rstrip() for name, text in rows)
-
-
-# --------------------
-# List what can be chosen.
-
-
-def _catalogue(module: ModuleType) -> list[Row]:
-    """Return each name of a catalogue with the comment next to it in the source."""
-    return re.findall(r"^    '(\w+)': .*  # (.+)$", inspect.getsource(module), re.MULTILINE)
-
-
-def _sensors() -> Iterable[Row]:
-    from texture_drivers import catalogue
-
-    return _catalogue(catalogue)
-
-
-def _arms() -> Iterable[Row]:
-    from texture_exploration.arms import catalogue
-
-    return _catalogue(catalogue)
-
-
-def _motions() -> Iterator[Row]:
-    from texture_exploration.motions import DEFAULTS
-    from texture_exploration.safety import SafetyLimits
-
-    for motion, defaults in DEFAULTS.items():
-        ranges = {name: (value, *SafetyLimits().range(name)) for name, value in defaults.items()}
-        yield (
-            motion,
-            ', '.join(
-                f'{name} {value:g} ({low:g} to {high:g} {unit})' for name, (value, low, high, unit) in ranges.items()
-            ),
-        )
-
-
-def _recipes() -> Iterator[Row]:
-    for kind in ('config/recipes', 'config/roughness'):
-        ours = folder('texture_estimation', kind)
-        # Those of the papers come last.
-        for name, path in sorted(shipped('texture_estimation', kind).items(), key=lambda one: one[1].parent != ours):
-            yield name, str(yaml.safe_load(path.read_text(encoding='utf-8')).get('description', ''))
-
-
-def _surfaces() -> Iterator[Row]:
-    from texture_simulation.scene import load_scene
-
-    for name in shipped('texture_simulation', 'config/scenes'):
-        scene = load_scene(name)
-        yield name, f'{scene.sensor}: {", ".join(scene.surfaces)}'
-
-
-LISTS: Mapping[str, tuple[str, Callable[[], Iterable[Row]]]] = {
-    'sensors': ('what `sensor:=` of a launch takes', _sensors),
-    'motions': ('what `texture explore` takes, with default and range of each number', _motions),
-    'arms': ('what the parameter `arm` of the explorer takes', _arms),
-    'recipes': ('what `texture train` takes', _recipes),
-    'surfaces': ('what the emulator simulates, by scene', _surfaces),
-}
-
-
-def _configure_list(parser: argparse.ArgumentParser) -> None:
-    about = '; '.join(f'{name}: {meaning}' for name, (meaning, _) in LISTS.items())
-    parser.add_argument('what', metavar='{' + ','.join(LISTS) + '}', help=about)
-
-
-def _list(options: argparse.Namespace) -> int:
-    print(table(find(LISTS, options.what, 'list')[1]()))
-    return 0
 
 
 # --------------------
@@ -188,16 +111,11 @@ def _ports() -> str:
 
 
 def _groups() -> str:
-    mine = {grp.getgrgid(number).gr_name for number in os.getgroups() if _has_name(number)}
-    rows = [f'{name} {"yes" if name in mine or not os.geteuid() else "no"} ({use})' for name, use in GROUPS.items()]
-    return ', '.join(rows)
-
-
-def _has_name(group: int) -> bool:
-    try:
-        return bool(grp.getgrgid(group))
-    except KeyError:
-        return False
+    mine = set(os.getgroups())
+    members = {one.gr_name for one in grp.getgrall() if one.gr_gid in mine}
+    return ', '.join(
+        f'{name} {"yes" if name in members or not os.geteuid() else "no"} ({use})' for name, use in GROUPS.items()
+    )
 
 
 def _ros() -> str:
@@ -218,11 +136,6 @@ def _dds() -> str:
     return f'{name}, domain {domain}, discovery range {reach}'
 
 
-def _dashboard_port() -> str:
-    with socket.socket() as probe:
-        return '8085 is busy' if probe.connect_ex(('127.0.0.1', 8085)) == 0 else '8085 is free'
-
-
 CHECKS: Mapping[str, Callable[[], str]] = {
     'system': lambda: f'{platform.platform()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}',
     'Python': platform.python_version,
@@ -230,7 +143,6 @@ CHECKS: Mapping[str, Callable[[], str]] = {
     'DDS': _dds,
     'serial ports': _ports,
     'groups': _groups,
-    'dashboard': _dashboard_port,
     'versions': lambda: ', '.join(f'{name} {_version(name)}' for name in PACKAGES),
 }
 
@@ -240,6 +152,5 @@ def _doctor(_options: argparse.Namespace) -> int:
     return 0
 
 
-list_ = Command('list what can be chosen: sensors, motions, arms, recipes, surfaces', _configure_list, _list)
 info = Command('show what a bag or a model holds', _configure_info, _info)
 doctor = Command('show what matters of this machine: ports, groups, ROS, versions', lambda _parser: None, _doctor)
