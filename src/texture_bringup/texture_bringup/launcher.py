@@ -17,7 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -253,24 +253,9 @@ class RunningNode:
         self._say(f'[{self.node.label}] {self.last}')
 
     def send(self, number: signal.Signals) -> None:
-        """Send a signal to the whole group of the process; one that is gone is left alone.
-
-        A Python program that is still importing would only print a traceback on SIGINT, so it gets SIGTERM instead: it
-        has handlers for both once it runs, and none for SIGTERM before.
-        """
-        if number == signal.SIGINT and not self._catches(signal.SIGTERM):
-            number = signal.SIGTERM
+        """Send a signal to the whole group of the process; one that is gone is left alone."""
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(self.pid, number)
-
-    def _catches(self, number: signal.Signals) -> bool:
-        """Return whether the process has a handler for a signal; True where that cannot be found out."""
-        try:
-            status = Path(f'/proc/{self.pid}/status').read_text(encoding='ascii', errors='replace')
-        except OSError:
-            return True
-        caught = next((line.split()[1] for line in status.splitlines() if line.startswith('SigCgt:')), 'f' * 16)
-        return bool(int(caught, 16) >> (number - 1) & 1)
 
 
 def ending(returncode: int) -> str:
@@ -305,11 +290,11 @@ class Supervisor:
         self._running: list[RunningNode] = []
         self._selector = selectors.DefaultSelector()
         self._stopping_since_s: float | None = None
-        self._failed = False
+        self._code = 0
         self._cause = ''  # why the launch ends without a request
 
     def run(self) -> int:
-        """Run the nodes to their end; return 0 if none died, else 1.
+        """Run the nodes to their end; return 0 if none died, 2 if a needed one reported an invalid input, else 1.
 
         SIGINT, SIGTERM and SIGHUP stop them; further ones change nothing, as an explorer needs its time to lift the
         finger. A node that had to be killed counts as one that died.
@@ -330,7 +315,7 @@ class Supervisor:
                     signal.signal(number, handler)
         if self._cause:  # repeated, as nodes that are being stopped write many lines
             self._say(f'[launch] the launch ended because {self._cause}')
-        return int(self._failed)
+        return self._code
 
     def stop(self) -> None:
         """Begin to stop all nodes, unless that has begun."""
@@ -376,7 +361,7 @@ class Supervisor:
             process.signals = due
             process.send(number)
         if number is signal.SIGKILL:
-            self._failed = True
+            self._code = 1
             self._say('[launch] nodes that did not end were killed; check whether the finger still presses')
 
     def _end(self, process: RunningNode, code: int) -> None:
@@ -386,9 +371,9 @@ class Supervisor:
         restart = node.respawn and code != MISTAKE and not (stopping or self._together)
         restart = restart and (node.respawn_max_retries < 0 or process.deaths < node.respawn_max_retries)
         needed = node.needed or node.respawn or (self._together and code != 0)
-        self._failed |= code != 0 and not (stopping or restart)
-        ended = 'was ended while it started' if stopping and code == -signal.SIGTERM else ending(code)
-        self._say(f'[launch] {node.label} {ended}')
+        if code != 0 and not (stopping or restart):
+            self._code = MISTAKE if code == MISTAKE and needed else 1
+        self._say(f'[launch] {node.label} {ending(code)}')
         if restart:
             self._due.append((time.monotonic() + node.respawn_delay_s, node, process.deaths + 1))
         elif needed and not stopping:
@@ -454,43 +439,53 @@ class Scope:
 
     def perform(self, name: str, arguments: Sequence[str]) -> str:
         """Return the value of one substitution; UnknownName or InvalidLaunch if it has none."""
-        substitution, fewest, most = find(SUBSTITUTIONS, name, 'substitution')
+        fewest, most = find(SUBSTITUTIONS, name, 'substitution')
         if not fewest <= len(arguments) <= most:
             raise InvalidLaunch(
                 f'$({" ".join([name, *arguments])}) has {len(arguments)} arguments; {fewest} to {most} are needed'
             )
-        return substitution(self, *arguments)
-
-
-def _variable(scope: Scope, name: str, *default: str) -> str:
-    if name not in scope.variables and not default:
-        raise unknown_name(name, scope.variables, 'launch variable')
-    return scope.variables.get(name, *default)
-
-
-def _environment(scope: Scope, name: str, *default: str) -> str:
-    if name not in scope.environment and not default:
+        first, *rest = arguments
+        if name == 'find-pkg-share':
+            return str(prefix(first) / 'share' / first)
+        if name == 'not-equals':
+            return 'true' if first != rest[0] else 'false'
+        known = self.variables if name == 'var' else self.environment
+        if first in known:
+            return known[first]
+        if rest:
+            return rest[0]
+        if name == 'var':
+            raise unknown_name(first, known, 'launch variable')
         raise InvalidLaunch(
-            f"environment variable '{name}' is not set; set it, or give a default: $(env {name} DEFAULT)"
+            f"environment variable '{first}' is not set; set it, or give a default: $(env {first} DEFAULT)"
         )
-    return scope.environment.get(name, *default)
 
 
-# How a call is performed, and the fewest and the most arguments that it takes.
-SUBSTITUTIONS: Mapping[str, tuple[Callable[..., str], int, int]] = {
-    'var': (_variable, 1, 2),
-    'env': (_environment, 1, 2),
-    'find-pkg-share': (lambda _, package: str(prefix(package) / 'share' / package), 1, 1),
-    'not-equals': (lambda _, left, right: 'true' if left != right else 'false', 2, 2),
-}
+# The fewest and the most arguments that a substitution takes.
+SUBSTITUTIONS = {'var': (1, 1), 'env': (1, 2), 'find-pkg-share': (1, 1), 'not-equals': (2, 2)}
 
 
 # --------------------
 # The type of a parameter given as text: YAML's rules, as in ROS 2 launch files.
 
-SCALARS = (bool, int, float, str)
-TYPES: Mapping[str, type | None] = {**{kind.__name__: kind for kind in SCALARS}, 'yaml': None}
 TRUTH = {'true': True, '1': True, 'false': False, '0': False}
+SCALARS = (bool, int, float, str)
+
+
+def _scalar(text: str) -> Any:
+    """Return what YAML reads in a text; the text itself if it is no YAML."""
+    try:
+        value = parse_yaml(text) if text else text
+    except PARSE_ERRORS:
+        return text
+    if not isinstance(value, SCALARS):
+        raise ValueError(text)
+    return value
+
+
+TYPES: Mapping[str, Callable[[str], Any]] = {
+    'yaml': _scalar, 'str': str, 'float': float, 'int': int, 'bool': TRUTH.__getitem__,
+}  # fmt: skip
 
 
 def parameter_value(text: str, type_name: str) -> Any:
@@ -499,21 +494,11 @@ def parameter_value(text: str, type_name: str) -> Any:
     Quotes do not keep `'$(var x)'` a string, as upstream reads the text as YAML before and after the substitution:
     `type="str"` does.
     """
-    kind = find(TYPES, type_name, 'parameter type')
-    if kind is str or not text:
-        return text
     try:
-        if kind is bool and text in TRUTH:  # YAML takes 1 and 0 for numbers
-            return TRUTH[text]
-        value = kind(text) if kind in (int, float) else parse_yaml(text)
-        if not isinstance(value, kind or SCALARS):
-            raise ValueError(text)
-    except PARSE_ERRORS as error:
-        if kind is None and isinstance(error, yaml.YAMLError):
-            return text
-        wanted = kind.__name__ if kind else 'bool, int, float or str'
+        return find(TYPES, type_name, 'parameter type')(text)
+    except (ValueError, KeyError) as error:
+        wanted = 'bool, int, float or str' if type_name == 'yaml' else type_name
         raise InvalidLaunch(f"parameter value '{text}' is no {wanted}; change it, or the param's type") from error
-    return value
 
 
 # --------------------
@@ -525,7 +510,7 @@ def parameter_value(text: str, type_name: str) -> Any:
 MAX_BYTES = 200_000  # of one file; the longest in use has 5 kB
 MAX_INCLUDES = 20  # of files within each other
 SUFFIX = '.launch.xml'
-CONDITIONS = ('if', 'unless')
+CONDITIONS = {'if': True, 'unless': False}
 NODE_TEXTS = (
     'pkg',
     'exec',
@@ -537,7 +522,7 @@ NODE_TEXTS = (
     'on_exit',
 )
 # Attributes and child elements of each element; None: any element.
-ALLOWED: Mapping[str, tuple[Sequence[str], Sequence[str] | None]] = {
+ALLOWED: Mapping[str, tuple[Collection[str], Collection[str] | None]] = {
     'launch': ((), None),
     'arg': (('name', 'default', 'description', *CONDITIONS), ('choice',)),
     'arg of an include': (('name', 'value'), ()),
@@ -576,20 +561,8 @@ def given_arguments(texts: Iterable[str]) -> dict[str, str]:
     return given
 
 
-def _refuse_special(given: Mapping[str, str]) -> None:
-    """Refuse an argument that names a special file, which nodes would read without end, unless it is a device."""
-    for name, value in given.items():
-        path = Path(value).expanduser()
-        if 'device' in name or not path.exists() or path.is_file() or path.is_dir():
-            continue
-        raise InvalidLaunch(
-            f"argument '{name}' is '{value}', which is neither a regular file nor a folder; give the path of one"
-        )
-
-
 def read(path: Path, given: Mapping[str, str], environment: Mapping[str, str]) -> list[NodeDescription]:
     """Return the nodes of a launch file, in its order."""
-    _refuse_special(given)
     reader = _Reader()
     reader.read_file(path, Scope(dict(given), dict(environment)))
     for name in given:
@@ -675,14 +648,11 @@ def _number(text: str, name: str, lowest: float) -> float:
 
 
 def _wanted(element: Element, scope: Scope) -> bool:
-    """Return whether its condition is met; true without one."""
-    given = [name for name in CONDITIONS if name in element.attrib]
-    if len(given) > 1:
-        raise InvalidLaunch(f"<{element.tag}> has both 'if' and 'unless'; give one of them")
-    if not given:
-        return True
-    met = _truth(scope.expand(element.attrib[given[0]]), f"'{given[0]}' of <{element.tag}>")
-    return met == (given[0] == 'if')
+    """Return whether its conditions are met; true without one."""
+    given = {name: element.attrib[name] for name in CONDITIONS if name in element.attrib}
+    return all(
+        _truth(scope.expand(text), f"'{name}' of <{element.tag}>") is CONDITIONS[name] for name, text in given.items()
+    )
 
 
 class _Reader:
