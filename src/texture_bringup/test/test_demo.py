@@ -2,39 +2,42 @@
 # SPDX-License-Identifier: Apache-2.0
 """The demonstration, shortened; what it prints is tested where it is made."""
 
-import io
 import json
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
+from texture_bringup import demo
 from texture_bringup.demo import (
     ACCEPTED,
     ATTEMPTS,
+    FIRST_PORT,
+    FIRST_UNICAST,
+    PORTS_PER_DOMAIN,
     UNKNOWN,
-    DemoPlan,
     ProgressLog,
     Slide,
-    demonstrate,
-    explore_with_retries,
+    free_domain,
+    slide_over,
 )
 from texture_bringup.operator import ExplorationResult
-from texture_core.errors import ExplorationError, MotionAborted
+from texture_core.errors import ExplorationError
 from texture_core.ros_testing import killed_on_error
 from texture_core.types import ExplorationRequest, Rejection, RoughnessEstimate, TextureEstimate
 
 pytestmark = pytest.mark.realtime
 
 DEADLINE_S = 60.0
-SHORT = DemoPlan(recognised=('glass', 'ridge_2mm_deep'), untrained=('cardboard',))
 
 
 def started(log: Path) -> list[int]:
@@ -62,28 +65,50 @@ def test_an_answer_is_as_expected_if_label_and_rejection_are(
     assert Slide('glass', 'glass', expected, answer, []).as_expected is as_expected
 
 
-@pytest.mark.parametrize('aborted', range(ATTEMPTS + 1))
-def test_an_aborted_slide_is_made_again_and_that_is_said(aborted: int) -> None:
-    nothing = TextureEstimate(0, '', ''), RoughnessEstimate(0, '')
-    results = [
-        ExplorationResult(ExplorationError.ARM_FAULT, 'the arm has not answered for 135 ms', 'late', *nothing)
-    ] * aborted
-    results.append(ExplorationResult(ExplorationError.NONE, 'the motion was completed', 'good', *nothing))
-    said: list[str] = []
-    made = iter(results)
-    if aborted == ATTEMPTS:
-        with pytest.raises(MotionAborted, match='the exploration of felt failed: the arm has not answered'):
-            explore_with_retries(lambda _: next(made), ExplorationRequest('linear_slide', surface='felt'), said.append)
-    else:
-        explored = explore_with_retries(lambda _: next(made), ExplorationRequest('linear_slide'), said.append)
-        assert explored.exploration_id == 'good'
-        assert said == ['aborted: the arm has not answered for 135 ms; trying again'] * aborted
+ENDS = {
+    'aborted': (ExplorationError.ARM_FAULT, Rejection.NO_MODEL),
+    'novel': (ExplorationError.NONE, Rejection.NOVEL),
+    'good': (ExplorationError.NONE, Rejection.NONE),
+}
+
+
+@pytest.mark.parametrize(
+    ('ends', 'expected', 'last'),
+    [
+        (['good'], ACCEPTED, 'good'),
+        (['aborted', 'good'], ACCEPTED, 'good'),
+        (['novel', 'aborted', 'good'], ACCEPTED, 'good'),
+        (['aborted'] * ATTEMPTS, ACCEPTED, 'aborted'),
+        (['novel'], UNKNOWN, 'novel'),
+        (['good'], UNKNOWN, 'good'),  # a wrong label is never asked again
+    ],
+)
+def test_an_aborted_slide_and_a_rejected_one_over_a_trained_surface_are_made_again(
+    ends, expected, last, capsys
+) -> None:
+    made = iter(ends)
+
+    def explore(_request, _on_progress):
+        error, rejection = ENDS[name := next(made)]
+        estimate = TextureEstimate(0, name, 'felt', rejection)
+        return ExplorationResult(error, f'it {name}', name, estimate, RoughnessEstimate(0, ''))
+
+    operator = SimpleNamespace(explore=explore, set_parameters=lambda *_: None)
+    request = ExplorationRequest('linear_slide', surface='felt')
+    slide = slide_over(operator, request, 'felt', expected, ProgressLog())
+    assert (slide.answer.exploration_id, list(made)) == (last, [])
+    assert capsys.readouterr().out.count('trying again') == len(ends) - 1
 
 
 @pytest.mark.ros
-def test_it_accepts_trained_surfaces_and_rejects_others_and_leaves_models_answers_and_picture(tmp_path) -> None:
-    out = io.StringIO()
-    assert demonstrate(tmp_path / 'demo', 'default', 0, SHORT, ProgressLog(out=out)), out.getvalue()
+def test_it_accepts_trained_surfaces_and_rejects_others_and_leaves_models_answers_and_picture(
+    tmp_path, monkeypatch, capsys
+) -> None:
+    monkeypatch.setattr(demo, 'RECOGNISED', ('glass', 'ridge_2mm_deep'))
+    monkeypatch.setattr(demo, 'UNTRAINED', ('cardboard',))
+    right = demo.demonstrate(tmp_path / 'demo', 'default', 0, ProgressLog())
+    said = capsys.readouterr().out
+    assert right, said
     slides = {slide['title']: slide for slide in json.loads((tmp_path / 'demo/demo.json').read_text())['slides']}
     assert slides.pop('cardboard')['rejection'] in ('NOVEL', 'AMBIGUOUS')
     assert {title: slide['rejection'] for title, slide in slides.items() if title != 'over the edge'} == {
@@ -93,7 +118,7 @@ def test_it_accepts_trained_surfaces_and_rejects_others_and_leaves_models_answer
     }
     assert slides['glass']['decided']
     assert slides['over the edge']['outcome'].startswith('the contact with the surface was lost')
-    assert re.search(r'rejected, outside the training: speed 0\.0[12]\d* m/s', out.getvalue())
+    assert re.search(r'rejected, outside the training: speed 0\.0[12]\d* m/s', said)
     assert (tmp_path / 'demo/demo.png').stat().st_size > 10_000
 
 
@@ -107,9 +132,7 @@ def test_ctrl_c_ends_it_cleanly_and_leaves_no_process(tmp_path) -> None:
         for line in demo.stdout:
             if 'Trained surfaces' in line:
                 break
-        pids = [
-            int(number) for number in re.findall(r'started \(process (\d+)\)', (tmp_path / 'nodes.log').read_text())
-        ]
+        pids = started(tmp_path / 'nodes.log')
         demo.send_signal(signal.SIGINT)
         _, said = demo.communicate(timeout=DEADLINE_S)
     assert demo.returncode == 130
@@ -139,3 +162,10 @@ def test_the_nodes_end_even_if_the_demonstration_is_killed(tmp_path) -> None:
     while any(Path(f'/proc/{pid}').exists() for pid in pids):
         assert time.monotonic() < deadline
         time.sleep(0.05)
+
+
+def test_a_domain_in_use_is_left_alone() -> None:
+    first = free_domain()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as participant:
+        participant.bind(('', FIRST_PORT + PORTS_PER_DOMAIN * first + FIRST_UNICAST))
+        assert free_domain() != first
