@@ -82,7 +82,6 @@ class Ring:
         self.sensor = ''
         self.channel = ''
         self.unit = ''
-        self.lost = 0
 
     def update(self, signal: TactileSignal) -> None:
         """Append a batch; a stream of another sensor or rate starts again, lost samples leave a gap of NaN."""
@@ -90,7 +89,6 @@ class Ring:
             self._begin(signal)
         gap = 0 if self._next is None else max(0, signal.first_sample - self._next)
         self._next = signal.next_sample
-        self.lost += gap
         fresh = signal.samples[:, 0].astype(np.float64)
         if gap:
             fresh = np.concatenate([np.full(min(gap, len(self._samples)), np.nan), fresh])
@@ -304,7 +302,6 @@ class Feed:
             'low': _numbers(low),
             'high': _numbers(high),
             'length_s': SIGNAL_S,
-            'lost': ring.lost,
         }
 
     def _spectrum(self) -> dict[str, Any]:

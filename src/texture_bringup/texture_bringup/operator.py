@@ -22,7 +22,7 @@ from rclpy.action import ActionClient
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.parameter import Parameter
+from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.task import Future
 from rclpy.utilities import get_rmw_implementation_identifier
@@ -424,10 +424,11 @@ class Operator:
         client = self._parameters_of(node, deadline_s)
         self._set(node, client, [Parameter(name, value=value) for name, value in values.items()])
 
-    def parameters(self, node: str, names: Sequence[str], deadline_s: float = 10.0) -> list[float]:
-        """Return numbers that a node holds as parameters, in the order of their names."""
+    def parameters(self, node: str, names: Sequence[str], deadline_s: float = 10.0) -> list[Any]:
+        """Return the values of parameters of a node, in the order of their names."""
         client = self._parameters_of(node, deadline_s)
-        return [one.double_value for one in self._answer(node, client.get_parameters(list(names))).values]
+        answer = self._answer(node, client.get_parameters(list(names)))
+        return [parameter_value_to_python(one) for one in answer.values]
 
     def set_from_texts(self, node: str, texts: Mapping[str, str], deadline_s: float = 10.0) -> None:
         """Set parameters of a node from texts, read as the types that it has declared; UnknownName with the nearest."""
