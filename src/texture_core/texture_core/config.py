@@ -503,15 +503,6 @@ def parameters_of(cls: type) -> list[Parameter]:
     return listed
 
 
-def check_option(cls: type, name: str, value: Any) -> None:
-    """Check the option `--NAME` of a command, which sets a parameter."""
-    parameter = next(one for one in parameters_of(cls) if one.name == name)
-    try:
-        parameter.check(value)
-    except InvalidParameter as error:
-        raise InvalidParameter(str(error).replace(f"parameter '{name}'", f'--{name}', 1)) from None
-
-
 def from_mapping(cls: type[T], values: Mapping[str, Any], where: str = '') -> T:
     """Build a parameter dataclass from a mapping (a YAML section); parameters that it lacks keep their default."""
     if not (isinstance(cls, type) and dataclasses.is_dataclass(cls)):
