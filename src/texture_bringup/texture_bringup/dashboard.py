@@ -162,7 +162,7 @@ MAX_BODY_BYTES = 4096
 MAX_MESSAGE_BYTES = 1024
 MAX_VIEWERS = 16
 HEARTBEAT_S = 10.0
-REQUEST_S, LOOK_S = 15.0, 1.0  # that a request may take to come, and how often that is looked at
+REQUEST_S = 15.0  # that a request may take to come
 SERVER_CLOSING_S = 1.0
 PAGE: Mapping[str, tuple[str, str]] = {
     '/': ('index.html', 'text/html'),
@@ -223,14 +223,12 @@ class Viewers:
 
 
 VIEWERS: web.AppKey[Viewers] = web.AppKey('viewers', Viewers)
-BUSY: web.AppKey[set[Any]] = web.AppKey('busy', set)  # connections whose request is being answered
 
 
 def make_app(commands: Any, access: Access, page: Path) -> web.Application:
     """Return the application, which is not started yet."""
     app = web.Application(middlewares=[_guard(access)], client_max_size=MAX_BODY_BYTES)
-    viewers, app[BUSY] = Viewers(), set()
-    app[VIEWERS] = viewers
+    viewers = app[VIEWERS] = Viewers()
 
     async def motions(_request: web.Request) -> web.StreamResponse:
         return web.json_response(await commands.offered())
@@ -259,7 +257,6 @@ def _guard(access: Access) -> Any:
 
     @web.middleware
     async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
-        request.app[BUSY].add(request.protocol)
         try:
             refusal = _refusal(access, request)
             if refusal is not None and refusal.status == web.HTTPUnauthorized.status_code:
@@ -269,8 +266,6 @@ def _guard(access: Access) -> Any:
         except web.HTTPException as error:
             error.headers.update(HEADERS)
             raise
-        finally:
-            request.app[BUSY].discard(request.protocol)
         if not response.prepared:
             response.headers.update(HEADERS)
         return response
@@ -333,14 +328,17 @@ class Serving:
     def __init__(self, app: web.Application, host: str, port: int) -> None:
         self._app = app
         self._loop = asyncio.new_event_loop()
-        self._runner = web.AppRunner(app, shutdown_timeout=1.0, access_log=None)
+        self._closing = asyncio.Event()
         self._started: concurrent.futures.Future[int] = concurrent.futures.Future()
-        self._thread = threading.Thread(target=self._serve, args=(host, port), name='web server')
+        self._thread = threading.Thread(
+            target=self._loop.run_until_complete, args=(self._serve(host, port),), name='web server'
+        )
         self._thread.start()
         try:
             self.port = self._started.result()
         except OSError as error:
             self._thread.join()
+            self._loop.close()
             raise LaunchFailed(
                 f"the dashboard cannot listen on '{host}' port {port}: {error.strerror or error}; "
                 'choose another host or port'
@@ -357,38 +355,18 @@ class Serving:
 
     def close(self) -> None:
         """Close all connections, and join the thread."""
-        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._loop.call_soon_threadsafe(self._closing.set)
         self._thread.join(SERVING_CLOSING_S)
-
-    def _serve(self, host: str, port: int) -> None:
-        asyncio.set_event_loop(self._loop)
-        try:
-            self._started.set_result(self._loop.run_until_complete(self._start(host, port)))
-        except OSError as error:
-            self._loop.run_until_complete(self._runner.cleanup())
-            self._loop.close()
-            self._started.set_exception(error)
-            return
-        closing = self._loop.create_task(self._close_silent())
-        self._loop.run_forever()
-        closing.cancel()
-        self._loop.run_until_complete(self._runner.cleanup())
         self._loop.close()
 
-    async def _close_silent(self) -> None:
-        """Close each connection whose next request does not come in time."""
-        since_s: dict[Any, float] = {}
-        while True:
-            await asyncio.sleep(LOOK_S)
-            now_s, server = self._loop.time(), self._runner.server
-            waiting = [one for one in (server.connections if server else ()) if one not in self._app[BUSY]]
-            since_s = {one: since_s.get(one, now_s) for one in waiting}
-            for one, begun_s in since_s.items():
-                if now_s - begun_s > REQUEST_S:
-                    one.force_close()
-
-    async def _start(self, host: str, port: int) -> int:
-        await self._runner.setup()
-        site = web.TCPSite(self._runner, host, port)
-        await site.start()
-        return int(self._runner.addresses[0][1])
+    async def _serve(self, host: str, port: int) -> None:
+        runner = web.AppRunner(self._app, shutdown_timeout=1.0, access_log=None)
+        await runner.setup()
+        try:
+            await web.TCPSite(runner, host, port).start()
+            self._started.set_result(int(runner.addresses[0][1]))
+            await self._closing.wait()
+        except OSError as error:
+            self._started.set_exception(error)
+        finally:
+            await runner.cleanup()

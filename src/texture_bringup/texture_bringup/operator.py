@@ -4,12 +4,10 @@
 
 from __future__ import annotations
 
-import asyncio
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from types import TracebackType
 from typing import Any
 
@@ -59,33 +57,6 @@ def middleware() -> str:
 
 
 # --------------------
-# Wait in a coroutine for an answer of ROS, which comes in another thread.
-
-FOUND_DEADLINE_S, FOUND_STEP_S = 5.0, 0.05
-
-
-async def ready(is_ready: Callable[[], bool], node: str) -> None:
-    """Wait until a node can be called: one that has just started is discovered a moment later."""
-    deadline_s = time.monotonic() + FOUND_DEADLINE_S
-    while not is_ready():
-        if time.monotonic() > deadline_s:
-            raise LaunchFailed(f'no {node} answers; is it running?')
-        await asyncio.sleep(FOUND_STEP_S)
-
-
-async def answer_of(future: Future, deadline_s: float) -> Any:
-    """Return the result of a future of ROS, which the executor's thread completes."""
-    loop = asyncio.get_running_loop()
-    answered: asyncio.Event = asyncio.Event()
-    future.add_done_callback(lambda _future: loop.call_soon_threadsafe(answered.set))
-    try:
-        await asyncio.wait_for(answered.wait(), deadline_s)
-    except asyncio.TimeoutError as error:
-        raise LaunchFailed(f'no answer within {deadline_s:.0f} s') from error
-    return future.result()
-
-
-# --------------------
 # Parameters of a node from texts, by the types that the node has declared.
 
 BOOLEANS = {'true': True, 'false': False}
@@ -125,17 +96,16 @@ def subscribe(node: Node, feed: Feed, on_bad: Callable[[InvalidData], None]) -> 
 
         return on_message
 
+    def note_diagnostics(message: DiagnosticArray) -> None:
+        ours = node.get_namespace().rstrip('/') + '/'
+        for status in message.status:
+            if status.name.startswith(ours):
+                level, name = LEVEL_NAMES.get(status.level, 'ERROR'), status.name.removeprefix(ours)
+                feed.node_statuses.update(name, level, status.message, time.monotonic(), has_ended(status))
+
     for topic, (kind, take) in feed.topics.items():
         node.create_subscription(getattr(msg, kind), topic, taking(take), quality_of_service(topic))
-
-
-def note_diagnostics(node: Node, feed: Feed, message: DiagnosticArray) -> None:
-    """Give the statuses of the nodes in the namespace of `node` to a feed."""
-    ours = node.get_namespace().rstrip('/') + '/'
-    for status in message.status:
-        if status.name.startswith(ours):
-            level, name = LEVEL_NAMES.get(status.level, 'ERROR'), status.name.removeprefix(ours)
-            feed.node_statuses.update(name, level, status.message, time.monotonic(), has_ended(status))
+    node.create_subscription(DiagnosticArray, '/diagnostics', note_diagnostics, 100)
 
 
 # --------------------
@@ -374,9 +344,6 @@ class Operator:
     def watch(self, feed: Feed, show: Callable[[], None]) -> None:
         """Let a feed take what the nodes publish, and call `show` after each message, until Ctrl-C."""
         subscribe(self._node, feed, lambda _error: None)
-        self._node.create_subscription(
-            DiagnosticArray, '/diagnostics', partial(note_diagnostics, self._node, feed), 100
-        )
         while True:
             self._step()
             show()

@@ -17,14 +17,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 from texture_msgs import msg
 
 from texture_bringup.dashboard import Access, Recorder, Serving, make_app
 from texture_bringup.feed import FRAME_PERIOD_S, Feed
-from texture_bringup.operator import Operator, answer_of, note_diagnostics, ready, subscribe
+from texture_bringup.operator import Operator, subscribe
 from texture_core.config import folder, from_mapping, param
 from texture_core.errors import InvalidData, InvalidParameter, LaunchFailed
 from texture_core.ros import (
@@ -38,7 +37,7 @@ from texture_core.types import ExplorationRequest, checked_label
 from texture_features.correction import read_reference
 
 T = TypeVar('T')
-EXPLORER_S, ANSWER_DEADLINE_S = 5.0, 30.0
+EXPLORER_S, ANSWER_DEADLINE_S, POLL_S = 5.0, 30.0, 0.02
 MAX_CHARACTERS = 200
 
 
@@ -105,9 +104,14 @@ class DashboardNode(Node):
 
     async def stop(self, _requested: Mapping[str, Any]) -> Mapping[str, Any]:
         """Stop what moves, by a client that exists all the time: here nothing is waited for that can be avoided."""
-        await ready(self._stop.service_is_ready, 'explorer')
-        answer = await answer_of(self._stop.call_async(Trigger.Request()), ANSWER_DEADLINE_S)
-        return {'success': answer.success, 'message': answer.message}
+        if not self._stop.service_is_ready():
+            raise LaunchFailed('no explorer answers; is it running?')
+        future, deadline_s = self._stop.call_async(Trigger.Request()), time.monotonic() + ANSWER_DEADLINE_S
+        while not future.done():
+            if time.monotonic() > deadline_s:
+                raise LaunchFailed(f'no answer within {ANSWER_DEADLINE_S:.0f} s')
+            await asyncio.sleep(POLL_S)
+        return {'success': future.result().success, 'message': future.result().message}
 
     async def tare(self, _asked: Mapping[str, Any]) -> Mapping[str, Any]:
         """Take the present level of the sensor as that without load."""
@@ -163,7 +167,6 @@ class DashboardNode(Node):
         subscribe(self, self._feed, self._on_bad)
         qos = quality_of_service('explorer_info')
         self.create_subscription(msg.ExplorerInfo, 'explorer_info', partial(setattr, self, '_info'), qos)
-        self.create_subscription(DiagnosticArray, '/diagnostics', partial(note_diagnostics, self, self._feed), 100)
 
     def _on_bad(self, error: InvalidData) -> None:
         self._bad += 1
