@@ -12,8 +12,8 @@ from texture_bringup.launcher import (
     command,
     expand,
     joined_namespace,
-    parameter_value,
     read,
+    typed,
 )
 from texture_core.errors import InvalidLaunch, UnknownName
 from texture_drivers.catalogue import SENSORS
@@ -64,8 +64,8 @@ def test_a_node_can_depend_on_whether_an_argument_is_given(launch, model, starte
         ('<arg name="speed" default="1"/><let name="x" value="$(var sped)"/>', "did you mean 'speed'"),
         ('<let name="x" value="$(find-pkg-shar p)"/>', "did you mean 'find-pkg-share'"),
         ('<node pkg="p" exec="e" if="yes"/>', 'true, false, 1 or 0'),
-        ('<node pkg="p" exec="e" respawn_delay="nan"/>', 'a number from 0 is needed'),
-        ('<node pkg="p" exec="e" respawn_max_retries="-2"/>', 'a number from -1 is needed'),
+        ('<node pkg="p" exec="e" respawn_delay="soon"/>', 'a number is needed'),
+        ('<node pkg="p" exec="e" respawn_max_retries="2.5"/>', 'a whole number is needed'),
         ('<node pkg="p" exec="e"><param name="x" value="1" type="flaot"/></node>', "did you mean 'float'"),
         ('<include file="FOLDER/a.launch.xml"/>', 'include itself'),
         ('<include file="FOLDER/b.launch.xml"><arg name="m" value="1"/></include>', "no argument of b.launch.xml 'm'"),
@@ -187,7 +187,7 @@ def test_a_namespace_is_joined_unless_it_is_absolute(base, name, joined) -> None
     ],
 )
 def test_values_are_typed_as_yaml_does_unless_a_type_is_given(text, type_name, value) -> None:
-    got = parameter_value(text, type_name)
+    got = typed(text, type_name, 'it')
     assert got == value
     assert type(got) is type(value)
 
@@ -203,8 +203,8 @@ def test_values_are_typed_as_yaml_does_unless_a_type_is_given(text, type_name, v
     ],
 )
 def test_a_value_of_another_type_is_refused(text, type_name) -> None:
-    with pytest.raises(InvalidLaunch, match='parameter value'):
-        parameter_value(text, type_name)
+    with pytest.raises(InvalidLaunch, match=r'it is .* is needed'):
+        typed(text, type_name, 'it')
 
 
 def shown(name, arguments):

@@ -7,7 +7,6 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import dataclasses
-import math
 import os
 import re
 import selectors
@@ -27,8 +26,18 @@ from xml.etree.ElementTree import Element
 
 import yaml
 
-from texture_core import config
-from texture_core.config import PARSE_ERRORS, FileRefused, find, parse_yaml, read_bounded, unknown_name
+from texture_core.config import (
+    PARSE_ERRORS,
+    FileRefused,
+    executable,
+    find,
+    find_file,
+    folder,
+    parse_yaml,
+    prefix,
+    read_bounded,
+    unknown_name,
+)
 from texture_core.errors import InvalidLaunch, LaunchFailed, TextureError
 
 # --------------------
@@ -144,28 +153,6 @@ def command(node: NodeDescription, parameter_folder: Path) -> list[str]:
     return [str(executable(node.package, node.executable)), '--ros-args', *options]
 
 
-# ROS packages and their executables over AMENT_PREFIX_PATH.
-INDEX = Path('share') / 'ament_index' / 'resource_index' / 'packages'
-
-
-def prefix(package: str) -> Path:
-    """Return the first prefix that holds a package; UnknownName, with the nearest package, if none does."""
-    prefixes = [Path(item) for item in os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep) if item]
-    for candidate in prefixes:
-        if (candidate / INDEX / package).exists():
-            return candidate
-    raise unknown_name(package, {item.name for place in prefixes for item in (place / INDEX).glob('*')}, 'package')
-
-
-def executable(package: str, name: str) -> Path:
-    """Return the path of an executable of a package; UnknownName, with the nearest one, if there is none."""
-    folder = prefix(package) / 'lib' / package
-    path = folder / name
-    if not (path.is_file() and os.access(path, os.X_OK)):
-        raise unknown_name(name, {item.name for item in folder.glob('*')}, f"executable of package '{package}'")
-    return path
-
-
 # --------------------
 # One node as a separate process group, which ends with the launcher.
 
@@ -182,7 +169,7 @@ def end_with(parent: int, number: signal.Signals) -> None:
         os._exit(1)
 
 
-class RunningNode:
+class RunningNode(subprocess.Popen[bytes]):
     """A running node, and the lines that it writes.
 
     Start it from the main thread of a program without other threads: the kernel ends it with the thread that did.
@@ -201,31 +188,22 @@ class RunningNode:
         self.last = ''  # line that it wrote
         self._say = say
         try:
-            self._process = subprocess.Popen(
+            super().__init__(
                 command_line,
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
                 # A pipe would hold the output of Python programs back until 8 KiB have come together.
                 env={**environment, 'PYTHONUNBUFFERED': '1'},
-                preexec_fn=partial(end_with, os.getpid(), signal.SIGTERM),  # noqa: PLW1509 - the launcher is a program without threads
+                preexec_fn=partial(end_with, os.getpid(), signal.SIGTERM),
                 start_new_session=True,
             )
         except OSError as error:
             raise LaunchFailed(f"'{command_line[0]}' cannot be started: {error.strerror}") from error
-        assert self._process.stdout is not None
-        self.stream: IO[bytes] = self._process.stdout
+        assert self.stdout is not None
+        self.stream: IO[bytes] = self.stdout
         self._begun = b''  # line
         os.set_blocking(self.stream.fileno(), False)
-
-    @property
-    def pid(self) -> int:
-        """Number of the process."""
-        return self._process.pid
-
-    def poll(self) -> int | None:
-        """Return the code with which the process ended; None while it runs."""
-        return self._process.poll()
 
     def read(self) -> bool:
         """Show the lines that have arrived; return whether anything had."""
@@ -241,7 +219,7 @@ class RunningNode:
     def close(self) -> None:
         """End what the process has started itself, show what is left, also of an unfinished line, and close."""
         self.send(signal.SIGKILL)
-        self._process.wait()
+        self.wait()
         while self.read():
             pass
         if self._begun:
@@ -342,7 +320,7 @@ class Supervisor:
         environment = dict(node.environment)
         if deaths and not any(environment.get(name) for name in PROFILES):
             # In the place of a dead node, with which the others still count, Fast DDS is to be discovered soon.
-            environment[PROFILES[0]] = str(config.folder('texture_bringup', 'config/fastdds') / 'restart.xml')
+            environment[PROFILES[0]] = str(folder('texture_bringup', 'config/fastdds') / 'restart.xml')
         process = RunningNode(node, self._commands[id(node)], environment, self._say)
         self._selector.register(process.stream, selectors.EVENT_READ, process)
         process.deaths = deaths
@@ -483,22 +461,27 @@ def _scalar(text: str) -> Any:
     return value
 
 
-TYPES: Mapping[str, Callable[[str], Any]] = {
-    'yaml': _scalar, 'str': str, 'float': float, 'int': int, 'bool': TRUTH.__getitem__,
-}  # fmt: skip
+# What reads a text, and what is allowed.
+TYPES: Mapping[str, tuple[Callable[[str], Any], str]] = {
+    'yaml': (_scalar, 'true or false, a number or a text'),
+    'str': (str, 'a text'),
+    'float': (float, 'a number'),
+    'int': (int, 'a whole number'),
+    'bool': (lambda text: TRUTH[text.strip().lower()], 'true, false, 1 or 0'),
+}
 
 
-def parameter_value(text: str, type_name: str) -> Any:
-    """Return the value of a parameter: bool, int, float or str.
+def typed(text: str, type_name: str, where: str) -> Any:
+    """Return a text as a value of a type.
 
     Quotes do not keep `'$(var x)'` a string, as upstream reads the text as YAML before and after the substitution:
     `type="str"` does.
     """
+    read, allowed = find(TYPES, type_name, 'parameter type')
     try:
-        return find(TYPES, type_name, 'parameter type')(text)
+        return read(text)
     except (ValueError, KeyError) as error:
-        wanted = 'bool, int, float or str' if type_name == 'yaml' else type_name
-        raise InvalidLaunch(f"parameter value '{text}' is no {wanted}; change it, or the param's type") from error
+        raise InvalidLaunch(f"{where} is '{text}'; {allowed} is needed") from error
 
 
 # --------------------
@@ -509,7 +492,6 @@ def parameter_value(text: str, type_name: str) -> Any:
 
 MAX_BYTES = 200_000  # of one file; the longest in use has 5 kB
 MAX_INCLUDES = 20  # of files within each other
-SUFFIX = '.launch.xml'
 CONDITIONS = {'if': True, 'unless': False}
 NODE_TEXTS = (
     'pkg',
@@ -538,16 +520,8 @@ ALLOWED: Mapping[str, tuple[Collection[str], Collection[str] | None]] = {
 
 
 def find_launch_file(name_or_path: str) -> Path:
-    """Return a launch file: a path, or the name of one of this package, such as 'emulator' or 'emulator.launch.xml'."""
-    path = Path(name_or_path).expanduser()
-    if path.is_file():
-        return path
-    folder = config.folder('texture_bringup', 'launch')
-    shipped = {item.name.removesuffix(SUFFIX): item for item in folder.glob(f'*{SUFFIX}')}
-    name = name_or_path.removesuffix(SUFFIX)
-    if name not in shipped:
-        raise unknown_name(name, shipped, 'launch file')
-    return shipped[name]
+    """Return a launch file: a path, or the name of one that a package ships, such as 'emulator'."""
+    return find_file(name_or_path, 'texture_bringup', 'launch', 'launch file', '.launch.xml')
 
 
 def given_arguments(texts: Iterable[str]) -> dict[str, str]:
@@ -629,29 +603,12 @@ def _attribute(element: Element, name: str) -> str:
     return element.attrib[name]
 
 
-def _truth(text: str, where: str) -> bool:
-    value = TRUTH.get(text.strip().lower())
-    if value is None:
-        raise InvalidLaunch(f"{where} is '{text}'; true, false, 1 or 0 is needed")
-    return value
-
-
-def _number(text: str, name: str, lowest: float) -> float:
-    """Return a number of a node that is finite and not below the lowest that is allowed."""
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not lowest <= number < math.inf:
-        raise InvalidLaunch(f"'{name}' of <node> is '{text}'; a number from {lowest:g} is needed")
-    return number
-
-
 def _wanted(element: Element, scope: Scope) -> bool:
     """Return whether its conditions are met; true without one."""
     given = {name: element.attrib[name] for name in CONDITIONS if name in element.attrib}
     return all(
-        _truth(scope.expand(text), f"'{name}' of <{element.tag}>") is CONDITIONS[name] for name, text in given.items()
+        typed(scope.expand(text), 'bool', f"'{name}' of <{element.tag}>") is CONDITIONS[name]
+        for name, text in given.items()
     )
 
 
@@ -747,9 +704,11 @@ class _Reader:
                 or '/' * ('namespace' in element.attrib),
                 parameters=tuple(_parameter(item, scope) for item in element.findall('param')),
                 remappings=tuple(_remapping(item, scope) for item in element.findall('remap')),
-                respawn=_truth(texts['respawn'] or 'false', "'respawn' of <node>"),
-                respawn_delay_s=_number(texts['respawn_delay'] or '0', 'respawn_delay', 0.0),
-                respawn_max_retries=int(_number(texts['respawn_max_retries'] or '-1', 'respawn_max_retries', -1.0)),
+                respawn=typed(texts['respawn'] or 'false', 'bool', "'respawn' of <node>"),
+                respawn_delay_s=typed(texts['respawn_delay'] or '0', 'float', "'respawn_delay' of <node>"),
+                respawn_max_retries=typed(
+                    texts['respawn_max_retries'] or '-1', 'int', "'respawn_max_retries' of <node>"
+                ),
                 needed=texts['on_exit'] == 'shutdown',
                 environment=dict(scope.environment),
             )
@@ -766,10 +725,7 @@ def _parameter(element: Element, scope: Scope) -> Path | dict[str, Any]:
     _check_form(element, 'param')
     if 'from' not in element.attrib:
         name, text = scope.expand(_attribute(element, 'name')), scope.expand(_attribute(element, 'value'))
-        try:
-            return {name: parameter_value(text, element.get('type', 'yaml'))}
-        except InvalidLaunch as error:
-            raise InvalidLaunch(f"<param name='{name}'>: {error}") from error
+        return {name: typed(text, element.get('type', 'yaml'), f"the value of <param name='{name}'>")}
     path = Path(scope.expand(element.attrib['from']))
     if 'name' in element.attrib:
         raise InvalidLaunch(f"<param from='{path}'> also has a name; the file holds the names")

@@ -146,7 +146,7 @@ def shipped(package: str, subfolder: str, suffix: str = '.yaml') -> dict[str, Pa
     names = dict.fromkeys([*sorted(others, reverse=True), package])  # the last one counts
     names[package] = names.pop(package)
     return {
-        item.stem: item
+        item.name.removesuffix(suffix): item
         for name in names
         for item in sorted(folder(name, subfolder).glob(f'*{suffix}'))
         if item.is_file()
@@ -164,6 +164,27 @@ def find_file(name_or_path: str, package: str, subfolder: str, kind: str, suffix
     if name_or_path not in known:
         raise unknown_name(name_or_path, known, kind)
     return known[name_or_path]
+
+
+# Packages that are installed, and their executables.
+INDEX = Path('share') / 'ament_index' / 'resource_index' / 'packages'
+
+
+def prefix(package: str) -> Path:
+    """Return the first prefix that holds a package; UnknownName, with the nearest package, if none does."""
+    prefixes = [Path(item) for item in os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep) if item]
+    for candidate in prefixes:
+        if (candidate / INDEX / package).exists():
+            return candidate
+    raise unknown_name(package, {item.name for place in prefixes for item in (place / INDEX).glob('*')}, 'package')
+
+
+def executable(package: str, name: str) -> Path:
+    """Return the path of an executable of a package; UnknownName, with the nearest one, if there is none."""
+    place = prefix(package) / 'lib' / package
+    if not (place / name).is_file():
+        raise unknown_name(name, {item.name for item in place.glob('*')}, f"executable of package '{package}'")
+    return place / name
 
 
 # --------------------
