@@ -116,8 +116,6 @@ def test_a_model_that_needs_the_slow_channels_refuses_a_bag_without_them(data, c
         ('launch emulator surface', 'write NAME:=VALUE'),
         ('launch replay', 'give bag:=VALUE'),
         ('replay glass --rate nan', "parameter 'rate' is nan; allowed is 0.01 to 1000.0"),
-        ('info nowhere', "there is no bag 'nowhere'"),
-        ('watch glass --rate 0', '--rate is 0; a number above 0 is needed'),
         ('import tabel map.yaml . out', "did you mean 'table'?"),
         ('demo --recipe defualt', "did you mean 'default'?"),
         ('dashboard --port 99999', 'allowed is 0 to 65535'),

@@ -30,7 +30,7 @@ HELP: Mapping[str, Sequence[str]] = {
     'Start': ('demo', 'doctor', 'launch', 'dashboard', 'activate', 'deactivate', 'set'),
     'Explore with the running robot': ('explore', 'watch', 'identify', 'stop', 'lift', 'recover', 'reboot'),
     'Prepare': ('tare', 'touch-surface', 'forget-touches', 'check'),
-    'Record': ('collect', 'record', 'replay', 'info', 'import', 'segment', 'export'),
+    'Record': ('collect', 'record', 'replay', 'import', 'segment', 'export'),
     'Learn': ('train', 'add', 'remove'),
     'Measure': ('evaluate', 'cross-validate', 'panel', 'experiment', 'benchmark', 'endurance'),
 }

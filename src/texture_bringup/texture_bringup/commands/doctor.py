@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The sub-commands of `texture` that show a bag or a model, and this machine."""
+"""`texture doctor`: show what matters of this machine: ports, groups, ROS, versions."""
 
 from __future__ import annotations
 
@@ -8,89 +8,8 @@ import argparse
 import grp
 import os
 import platform
-from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
-
-from texture_core.cli import Command
-from texture_core.types import NANOSECONDS
-
-# What a command needs is imported when it runs: each looks at other packages.
-# ruff: noqa: PLC0415
-
-Row = tuple[str, str]
-
-
-def table(rows: Iterable[Row]) -> str:
-    """Return rows of a name and a text as lines, the texts below each other."""
-    rows = list(rows)
-    width = max((len(name) for name, _ in rows), default=0)
-    return '\n'.join(f'{name:<{width}}  {text}'.rstrip() for name, text in rows)
-
-
-# --------------------
-# What a bag or a model holds.
-
-
-def _configure_info(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument('path', help='bag, folder of bags, or model')
-    parser.add_argument('--namespace', metavar='NS', help='namespace of the recorded nodes, if there are several')
-
-
-def _info(options: argparse.Namespace) -> int:
-    from texture_recordings.bags import find_bags
-
-    path = Path(options.path)
-    # A model is one of two files with the same name; everything else is read as a bag, whose errors are reported.
-    if not path.is_dir() and (path.suffix in ('.npz', '.json') or path.with_name(f'{path.name}.npz').is_file()):
-        print('\n'.join(_model_lines(path)))
-        return 0
-    for bag in find_bags([path]):
-        print(f'{bag}\n{table(_bag_rows(bag, options.namespace))}')
-    return 0
-
-
-def _model_lines(path: Path) -> list[str]:
-    from texture_core.config import load_card
-    from texture_estimation.model import load_model
-    from texture_estimation.roughness import load_roughness_model
-    from texture_evaluation.commands.train import graded_summary, summary
-
-    card = path.with_name(f'{path.name.removesuffix(".npz").removesuffix(".json")}.json')
-    if card.is_file() and 'regressor' in load_card(card):
-        graded = load_roughness_model(path)
-        return [f'roughness model {graded.name}', *graded_summary(graded, path)[:-1]]
-    model = load_model(path)
-    return [f'model {model.name}', *summary(model, path)[:-1], f'topics: {", ".join(model.recipe.feature_set.topics)}']
-
-
-def _bag_rows(bag: Path, namespace: str | None) -> Iterator[Row]:
-    """Yield number of messages by topic, length, sensors, and the slides over each surface of a bag."""
-    from texture_core.types import ExplorationState, Phase, TactileSignal
-    from texture_recordings.bags import read_bag
-
-    counts: Counter[str] = Counter()
-    ends: dict[str, tuple[str, Phase]] = {}
-    sensors: dict[str, str] = {}
-    first_ns = last_ns = 0
-    for topic, log_ns, value in read_bag(bag, None, namespace):
-        counts[topic] += 1
-        first_ns, last_ns = first_ns or log_ns, log_ns
-        if isinstance(value, TactileSignal):
-            sensors.setdefault(topic, f'{value.sensor}, {len(value.channels)} × {value.sampling_rate_hz:g} Hz')
-        elif isinstance(value, ExplorationState) and value.exploration_id:
-            ends[value.exploration_id] = value.surface, value.phase
-    yield '  length', f'{(last_ns - first_ns) / NANOSECONDS:.1f} s'
-    for topic, count in sorted(counts.items()):
-        yield f'  {topic}', f'{count} messages{f" of {sensors[topic]}" if topic in sensors else ""}'
-    for surface in sorted({surface for surface, _ in ends.values()}):
-        phases = Counter(phase.value for name, phase in ends.values() if name == surface)
-        yield f'  {surface or "(no surface)"}', ', '.join(f'{count} {phase}' for phase, count in phases.items())
-
-
-# --------------------
-# What of this machine matters, on one screen.
 
 PACKAGES = ('texture_core', 'rclpy', 'numpy', 'scipy', 'scikit-learn', 'rosbags', 'ur-rtde', 'miniaudio', 'aiohttp')
 GROUPS = {'dialout': 'serial devices', 'audio': 'sound cards', 'realtime': 'real-time priority'}
@@ -104,7 +23,7 @@ def _version(name: str) -> str:
 
 
 def _ports() -> str:
-    from serial.tools import list_ports
+    from serial.tools import list_ports  # noqa: PLC0415 - looked at here alone
 
     found = [f'{port.device} ({port.description})' for port in list_ports.comports()]
     return ', '.join(found) or 'none; plug the sensor in, and check whether its kernel driver is loaded'
@@ -127,7 +46,7 @@ def _ros() -> str:
 
 def _dds() -> str:
     try:
-        from texture_bringup.operator import middleware
+        from texture_bringup.operator import middleware  # noqa: PLC0415 - what is broken is told
 
         name = middleware()
     except Exception as error:  # this command reports any error of a broken installation
@@ -147,10 +66,13 @@ CHECKS: Mapping[str, Callable[[], str]] = {
 }
 
 
-def _doctor(_options: argparse.Namespace) -> int:
-    print(table((name, check()) for name, check in CHECKS.items()))
+def configure(_parser: argparse.ArgumentParser) -> None:
+    """Add no argument."""
+
+
+def run(_options: argparse.Namespace) -> int:
+    """Show a line for each fact."""
+    width = max(map(len, CHECKS))
+    for name, check in CHECKS.items():
+        print(f'{name:<{width}}  {check()}')
     return 0
-
-
-info = Command('show what a bag or a model holds', _configure_info, _info)
-doctor = Command('show what matters of this machine: ports, groups, ROS, versions', lambda _parser: None, _doctor)

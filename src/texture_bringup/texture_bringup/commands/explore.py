@@ -120,8 +120,8 @@ def _explore(options: argparse.Namespace) -> int:
     try:
         with Operator(options.namespace) as operator:
             operator.wait_for_explorer(EXPLORER_S, SOON_S)
-            while made < len(requests):
-                result = explored(operator, requests[made])
+            for request in requests:
+                result = explored(operator, request)
                 code = max(code, exit_code(result))
                 if options.json:
                     print(json.dumps(as_json(result)), flush=True)
@@ -132,9 +132,7 @@ def _explore(options: argparse.Namespace) -> int:
                 made += 1
     finally:
         if made < len(requests) > 1:
-            left = ' '.join(f'{degrees:g}' for degrees in options.direction[made:])
-            advice = '' if options.preset else f'; go on with --direction {left}'
-            print(f'{made} of {len(requests)} slides were made{advice}', file=sys.stderr)
+            print(f'{made} of {len(requests)} slides were made', file=sys.stderr)
     return code
 
 
@@ -484,7 +482,6 @@ def _configure_check(parser: argparse.ArgumentParser) -> None:
         help='slide twice, and store that as the slide of the finger of the training, if both agree',
     )
     parser.add_argument('--correct', action='store_true', help='write the correction of gain and response, if needed')
-    parser.add_argument('--bag', help='take the last labelled slide of a bag instead of sliding now')
     for option, (_, unit, meaning, usual) in PLATE_NUMBERS.items():
         shown = f'{meaning}, {unit}; default: that of the reference, or {usual:g}'
         parser.add_argument(f'--{option}', type=float, help=shown)
@@ -503,11 +500,10 @@ def _check(options: argparse.Namespace) -> int:
     # Report what is missing before the robot moves.
     topics = load_model(options.model).recipe.feature_set.topics
     reference, made = ({}, {}) if options.store else read_reference(options.model)
-    request = None if options.bag else plate_request(options, made)
+    request = plate_request(options, made)
     with tempfile.TemporaryDirectory() as folder:
-        bag = Path(options.bag) if options.bag else Path(folder) / 'plate'
-        if request:
-            slide_over_plate(bag, request, options.namespace, 2 if options.store else 1)
+        bag = Path(folder) / 'plate'
+        slide_over_plate(bag, request, options.namespace, 2 if options.store else 1)
         slides = SlideDataset.from_bags([bag]).slides
     if options.store:
         print(store_reference(options.model, topics, slides, request))
