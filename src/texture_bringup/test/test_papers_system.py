@@ -73,17 +73,6 @@ PAPERS = {
         slides=8,
         live=5,
     ),
-    'Roberge et al., variables for each pair': Paper(  # of the textures of their scene
-        'tsf85_3x4',
-        'ets-linear',
-        'ets-linear-svm-pairs',
-        slides=8,
-        live=3,
-        scene='ets_linear',
-        surfaces=('ridge_1', 'ridge_2a'),
-    ),
-    'Roberge et al., circles': Paper('tsf85_3x4', 'ets-circular', 'ets-circular-svm'),
-    'Roberge et al., ten textures': Paper('tsf85_3x4', 'ets-ten-textures', 'ets-fine-svm', slides=5, live=3),
     'Jamali & Sammut 2010': Paper(
         'daq',
         'jamali',
@@ -91,20 +80,13 @@ PAPERS = {
         slides=5,  # the variances of naive Bayes
         live=3,
     ),
-    'Kaboli et al. 2015, two fingers': Paper('biotac_hand', 'kaboli', 'kaboli-svm-two-fingers'),
     'Kaboli et al. 2015, one finger': Paper('biotac', 'kaboli', 'kaboli-svm', slides=5),
     'Kaboli et al. 2015, two fingers of the emulated hand': Paper(
         'biotac_hand', 'kaboli', 'kaboli-svm-two-fingers', robot='hand'
     ),
     'Hu et al. 2014, film on rails': Paper('pvdf', 'hu-cross', 'hu-pca-svm-xy', slides=1, robot='rails'),
-    'Hu et al. 2014': Paper('pvdf', 'hu-cross', 'hu-pca-svm-xy', slides=1),
 }
-ROUGHNESS = Paper(
-    'tsf85',
-    'ets-roughness',
-    'ets-roughness-ann1',
-    slides=6,
-)
+ROUGHNESS = Paper('tsf85', 'ets-roughness', 'ets-roughness-ann1', slides=6)
 
 
 def recipe_file(name: str) -> Path:

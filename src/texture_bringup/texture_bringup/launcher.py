@@ -43,7 +43,6 @@ from texture_core.errors import InvalidLaunch, LaunchFailed, TextureError
 # --------------------
 # A launcher as a child process of another program, which watches and ends it.
 
-DEATH = re.compile(r'\[launch\] .* (died with|was killed by) .*')
 STOP_DEADLINE_S = 15.0  # the launcher itself kills after 8 s
 
 
@@ -82,9 +81,10 @@ class ChildLauncher:
         self.stop()
 
     def check(self) -> None:
-        """Raise LaunchFailed, with the message of the log, if the nodes have ended."""
+        """Raise LaunchFailed, with the last line of the log, which names the cause, if the nodes have ended."""
         if self._process is not None and self._process.poll() is not None:
-            raise LaunchFailed(f'{self._reason()}; the output of all nodes is in {self.log}')
+            last = self.log.read_text(errors='replace').rstrip().rpartition('\n')[2].removeprefix('[launch] ')
+            raise LaunchFailed(f'{last or "the launcher ended"}; the output of all nodes is in {self.log}')
 
     def stop(self) -> None:
         """Stop the nodes and wait until none is left."""
@@ -96,12 +96,6 @@ class ChildLauncher:
         except subprocess.TimeoutExpired:
             self._process.kill()  # its nodes end with it
             self._process.wait()
-
-    def _reason(self) -> str:
-        """Return the sentence of the log that names what went wrong: a node that died, else the last line."""
-        lines = self.log.read_text(errors='replace').splitlines()
-        deaths = [line.removeprefix('[launch] ') for line in lines if DEATH.fullmatch(line)]
-        return f'node {deaths[0]}' if deaths else (lines or ['the launcher ended without a message'])[-1]
 
 
 # --------------------
