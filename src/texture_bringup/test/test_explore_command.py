@@ -54,7 +54,7 @@ class EndingOperator:
 )
 def test_what_ended_an_exploration_stands_on_lines_of_its_own_below_the_progress(monkeypatch, capsys, error, lines):
     monkeypatch.setattr('sys.stderr.isatty', lambda: True)
-    run_program(lambda: explored(EndingOperator(error), ExplorationRequest('linear_slide')))
+    run_program(lambda: explored(EndingOperator(error).explore, ExplorationRequest('linear_slide')))
     progress, *below = capsys.readouterr().err.splitlines()
     assert progress.strip() == ''  # the terminal returns to the beginning of the line before it draws
     assert below[0].startswith('slide')

@@ -19,11 +19,11 @@ from contextlib import contextmanager, suppress
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from texture_bringup.operator import ExplorationResult, Operator
+from texture_bringup.operator import ExplorationResult, Operator, Progress
 from texture_core.cli import USER_ERROR, Command, add_namespace, add_parameters, parameters_from
 from texture_core.config import find
 from texture_core.errors import (
@@ -38,7 +38,6 @@ from texture_core.types import (
     ExplorationRequest,
     ExplorationState,
     RoughnessEstimate,
-    SlideMotion,
     TextureEstimate,
 )
 from texture_estimation.model import load_model
@@ -60,6 +59,7 @@ from texture_features.correction import read_reference
 from texture_features.feature_set import FeatureSet
 from texture_recordings.dataset import SlideDataset
 
+T = TypeVar('T')
 # Option, field of the request, unit, meaning.
 NUMBERS = (
     ('speed', 'speed_m_s', 'M/S', 'speed along the surface'),
@@ -121,7 +121,7 @@ def _explore(options: argparse.Namespace) -> int:
         with Operator(options.namespace) as operator:
             operator.wait_for_explorer(EXPLORER_S, SOON_S)
             for request in requests:
-                result = explored(operator, request)
+                result = explored(operator.explore, request)
                 code = max(code, exit_code(result))
                 if options.json:
                     print(json.dumps(as_json(result)), flush=True)
@@ -175,35 +175,28 @@ def finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def explored(operator: Operator, request: ExplorationRequest) -> ExplorationResult:
+def explored(explore: Callable[[ExplorationRequest, Progress], T], request: ExplorationRequest) -> T:
     """Explore with a line of progress; after Ctrl-C print how the exploration ended."""
     try:
-        with progress_line():
-            return operator.explore(request, show_progress)
+        try:
+            return explore(request, show_progress)
+        finally:
+            if sys.stderr.isatty():
+                print(file=sys.stderr)
     except KeyboardInterrupt as interrupt:
         print(interrupt, file=sys.stderr)
         raise
 
 
-@contextmanager
-def progress_line() -> Iterator[None]:
-    """End the line of the progress, however the exploration ends."""
-    try:
-        yield
-    finally:
-        if sys.stderr.isatty():
-            print(file=sys.stderr)
-
-
-def print_result(explored: ExplorationResult) -> bool:
+def print_result(result: ExplorationResult) -> bool:
     """Print how an exploration ended; return whether it succeeded."""
-    if not explored.exploration_id:
-        raise MotionRefused(explored.message)
-    print(f'{explored.exploration_id}: {explored.message}')
-    print(f'texture:   {texture_text(explored.texture)}')
-    if explored.roughness.valid or explored.roughness.message:  # else there is no roughness model
-        print(f'roughness: {roughness_text(explored.roughness)}')
-    return bool(explored.success)
+    if not result.exploration_id:
+        raise MotionRefused(result.message)
+    print(f'{result.exploration_id}: {result.message}')
+    print(f'texture:   {texture_text(result.texture)}')
+    if result.roughness.valid or result.roughness.message:  # else there is no roughness model
+        print(f'roughness: {roughness_text(result.roughness)}')
+    return result.success
 
 
 def requests_of(options: argparse.Namespace) -> list[ExplorationRequest]:
@@ -271,7 +264,6 @@ def _configure_identify(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('model', help='trained on slides of several kinds over every texture')
     parser.add_argument('--sure', type=float, default=0.95, metavar='P', help='end at this probability; default: 0.95')
     parser.add_argument('--most', type=int, default=6, metavar='N', help='most slides that are made; default: 6')
-    parser.add_argument('--surface', default='', help='true name of the surface, if known; it labels a recording')
     add_namespace(parser)
 
 
@@ -294,37 +286,27 @@ def _identify(options: argparse.Namespace) -> int:
         while number < options.most and np.exp(belief.max()) < options.sure:
             number += 1
             motion, information = known.best_motion(belief, known.motions)
-            print(f'slide {number}: {motion_text(motion)}; {information:.2f} nats expected')
-            with progress_line():
-                explored, vectors = operator.explore_with_features(request_of(motion, options.surface), show_progress)
-            if not explored.success:
-                return int(not print_result(explored))
+            print(
+                f'slide {number}: {motion.motion}, direction {math.degrees(motion.direction_rad):.0f}°, '
+                f'{motion.speed_m_s:g} m/s, {motion.force_n:g} N, {motion.duration_s:g} s; '
+                f'{information:.2f} nats expected'
+            )
+            request = ExplorationRequest(
+                motion.motion,
+                speed_m_s=motion.speed_m_s,
+                force_n=motion.force_n,
+                distance_m=motion.speed_m_s * motion.duration_s,
+                direction_rad=motion.direction_rad,
+            )
+            result, vectors = explored(operator.explore_with_features, request)
+            if not result.success:
+                return int(not print_result(result))
             belief = known.update(belief, motion, slide_values(vectors, model.feature_set))
             likely = np.argsort(-belief, kind='stable')[:SHOWN]
             print(f'  {", ".join(f"{known.textures[k]} {np.exp(belief[k]):.2f}" for k in likely)}')
     best = int(belief.argmax())
     print(f'texture: {known.textures[best]}, probability {np.exp(belief[best]):.2f} after {number} slides')
     return 0
-
-
-def request_of(motion: SlideMotion, surface: str) -> ExplorationRequest:
-    """Return the request for a motion."""
-    return ExplorationRequest(
-        motion.motion,
-        speed_m_s=motion.speed_m_s,
-        force_n=motion.force_n,
-        distance_m=motion.speed_m_s * motion.duration_s,
-        direction_rad=motion.direction_rad,
-        surface=surface,
-    )
-
-
-def motion_text(motion: SlideMotion) -> str:
-    """Return a motion as text."""
-    return (
-        f'{motion.motion}, direction {math.degrees(motion.direction_rad):.0f}°, {motion.speed_m_s:g} m/s, '
-        f'{motion.force_n:g} N, {motion.duration_s:g} s'
-    )
 
 
 # --------------------
@@ -427,29 +409,26 @@ def recorder(operator: Operator, bag: Path, namespace: str) -> Iterator[Callable
                 process.kill()
 
 
-# Option, lowest and highest of the collection, unit, meaning.
-RANGES = (
-    ('speed', ('speed_low_m_s', 'speed_high_m_s'), 'm/s', 'speeds of the slides (default: 0.02 to 0.05)'),
-    ('force', ('force_low_n', 'force_high_n'), 'N', 'normal forces of the slides (default: 1 to 2)'),
-)
-IN_RANGES = tuple(name for _, names, _, _ in RANGES for name in names)
+# Parameters whose options are shorter; both numbers of a range follow one option.
+SHORTER = ('distance_m', 'speed_low_m_s', 'speed_high_m_s', 'force_low_n', 'force_high_n')
 
 
 def _configure_collect(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('surface', help='label of the surface under the finger')
     parser.add_argument('folder', type=Path, help='folder of the bags of all surfaces; made if missing')
-    for option, _, unit, meaning in RANGES:
-        parser.add_argument(f'--{option}', type=float, nargs=2, metavar=('LOW', 'HIGH'), help=f'{meaning}, {unit}')
-    add_parameters(parser, CollectionParams, without=(*IN_RANGES, 'distance_m'))
-    parser.add_argument('--distance', type=float, metavar='M', help='length of each slide (default: 0.04)')
+    shape: dict[str, Any] = {'type': float, 'nargs': 2, 'default': (0.0, 0.0), 'metavar': ('LOW', 'HIGH')}
+    parser.add_argument('--speed', help='speeds of the slides (default: 0.02 to 0.05), m/s', **shape)
+    parser.add_argument('--force', help='normal forces of the slides (default: 1 to 2), N', **shape)
+    add_parameters(parser, CollectionParams, without=SHORTER)
+    parser.add_argument(
+        '--distance', type=float, default=0.04, metavar='M', help='length of each slide (default: 0.04)'
+    )
     add_namespace(parser)
 
 
 def _collect(options: argparse.Namespace) -> int:
     """Collect, and report how well left-out places are recognised; return 0 if the bound is met, else 1."""
-    given = {'distance_m': options.distance} if options.distance is not None else {}
-    for option, names, _, _ in RANGES:
-        given |= dict(zip(names, getattr(options, option) or (), strict=False))
+    given = dict(zip(SHORTER, (options.distance, *options.speed, *options.force), strict=True))
     params = parameters_from(options, CollectionParams, given)
     with Operator(options.namespace) as operator:
         operator.wait_for_explorer(EXPLORER_S, SOON_S)
