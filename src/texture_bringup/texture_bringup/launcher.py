@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
-import dataclasses
 import os
 import re
 import selectors
@@ -390,54 +389,6 @@ def expand(text: str, perform: Perform) -> str:
 
 
 # --------------------
-# What a launch file can refer to at one place: variables, environment, namespace, packages.
-
-
-@dataclass
-class Scope:
-    """Variables, environment and namespace; elements change them for what follows in the same scope."""
-
-    variables: dict[str, str]
-    environment: dict[str, str]
-    namespace: str = ''
-
-    def copy(self) -> Scope:
-        """Return a scope whose changes do not reach this one."""
-        return dataclasses.replace(self, variables=dict(self.variables), environment=dict(self.environment))
-
-    def expand(self, text: str) -> str:
-        """Return a text with its substitutions performed."""
-        return expand(text, self.perform)
-
-    def perform(self, name: str, arguments: Sequence[str]) -> str:
-        """Return the value of one substitution; UnknownName or InvalidLaunch if it has none."""
-        fewest, most = find(SUBSTITUTIONS, name, 'substitution')
-        if not fewest <= len(arguments) <= most:
-            raise InvalidLaunch(
-                f'$({" ".join([name, *arguments])}) has {len(arguments)} arguments; {fewest} to {most} are needed'
-            )
-        first, *rest = arguments
-        if name == 'find-pkg-share':
-            return str(prefix(first) / 'share' / first)
-        if name == 'not-equals':
-            return 'true' if first != rest[0] else 'false'
-        known = self.variables if name == 'var' else self.environment
-        if first in known:
-            return known[first]
-        if rest:
-            return rest[0]
-        if name == 'var':
-            raise unknown_name(first, known, 'launch variable')
-        raise InvalidLaunch(
-            f"environment variable '{first}' is not set; set it, or give a default: $(env {first} DEFAULT)"
-        )
-
-
-# The fewest and the most arguments that a substitution takes.
-SUBSTITUTIONS = {'var': (1, 1), 'env': (1, 2), 'find-pkg-share': (1, 1), 'not-equals': (2, 2)}
-
-
-# --------------------
 # The type of a parameter given as text: YAML's rules, as in ROS 2 launch files.
 
 TRUTH = {'true': True, '1': True, 'false': False, '0': False}
@@ -497,20 +448,23 @@ NODE_TEXTS = (
     'respawn_max_retries',
     'on_exit',
 )
-# Attributes and child elements of each element; None: any element.
-ALLOWED: Mapping[str, tuple[Collection[str], Collection[str] | None]] = {
+# The attributes of each element, and the kinds of its child elements by their tag; None: any element.
+ALLOWED: Mapping[str, tuple[Collection[str], Mapping[str, str] | None]] = {
     'launch': ((), None),
-    'arg': (('name', 'default', 'description', *CONDITIONS), ('choice',)),
-    'arg of an include': (('name', 'value'), ()),
-    'let': (('name', 'value', *CONDITIONS), ()),
-    'set_env': (('name', 'value', *CONDITIONS), ()),
-    'push_ros_namespace': (('namespace', *CONDITIONS), ()),
+    'arg': (('name', 'default', 'description', *CONDITIONS), {'choice': 'choice'}),
+    'choice': (('value',), {}),
+    'arg of an include': (('name', 'value'), {}),
+    'let': (('name', 'value', *CONDITIONS), {}),
+    'set_env': (('name', 'value', *CONDITIONS), {}),
+    'push_ros_namespace': (('namespace', *CONDITIONS), {}),
     'group': (CONDITIONS, None),
-    'include': (('file', *CONDITIONS), ('arg',)),
-    'node': ((*NODE_TEXTS, 'output', *CONDITIONS), ('param', 'remap')),  # all output of a node is shown
-    'param': (('name', 'value', 'type', 'from'), ()),
-    'remap': (('from', 'to'), ()),
+    'include': (('file', *CONDITIONS), {'arg': 'arg of an include'}),
+    'node': ((*NODE_TEXTS, 'output', *CONDITIONS), {'param': 'param', 'remap': 'remap'}),  # all output is shown
+    'param': (('name', 'value', 'type', 'from'), {}),
+    'remap': (('from', 'to'), {}),
 }
+# The fewest and the most arguments that a substitution takes.
+SUBSTITUTIONS = {'var': (1, 1), 'env': (1, 2), 'find-pkg-share': (1, 1), 'not-equals': (2, 2)}
 
 
 def find_launch_file(name_or_path: str) -> Path:
@@ -531,8 +485,8 @@ def given_arguments(texts: Iterable[str]) -> dict[str, str]:
 
 def read(path: Path, given: Mapping[str, str], environment: Mapping[str, str]) -> list[NodeDescription]:
     """Return the nodes of a launch file, in its order."""
-    reader = _Reader()
-    reader.read_file(path, Scope(dict(given), dict(environment)))
+    reader = _Reader(given, environment)
+    reader.read_file(path)
     for name in given:
         if name not in reader.declared:
             raise unknown_name(name, reader.declared, f'argument of {path.name}')
@@ -549,7 +503,7 @@ def all_arguments(path: Path, environment: Mapping[str, str]) -> dict[str, Eleme
             found.setdefault(name, element)
         for element in root.iter('include'):
             with contextlib.suppress(TextureError):
-                included = Path(Scope({}, dict(environment)).expand(_attribute(element, 'file')))
+                included = Path(_Reader({}, environment).text(element, 'file'))
                 waiting += [included] * (included not in seen)
                 seen.add(included)
     return found
@@ -586,9 +540,12 @@ def _check_form(element: Element, kind: str) -> None:
     for name in element.attrib:
         if name not in attributes:
             raise unknown_name(name, attributes, f'attribute of <{element.tag}>')
+    if children is None:
+        return
     for child in element:
-        if children is not None and child.tag not in children:
+        if child.tag not in children:
             raise unknown_name(child.tag, children, f'element inside <{element.tag}>')
+        _check_form(child, children[child.tag])
 
 
 def _attribute(element: Element, name: str) -> str:
@@ -597,23 +554,18 @@ def _attribute(element: Element, name: str) -> str:
     return element.attrib[name]
 
 
-def _wanted(element: Element, scope: Scope) -> bool:
-    """Return whether its conditions are met; true without one."""
-    given = {name: element.attrib[name] for name in CONDITIONS if name in element.attrib}
-    return all(
-        typed(scope.expand(text), 'bool', f"'{name}' of <{element.tag}>") is CONDITIONS[name]
-        for name, text in given.items()
-    )
-
-
 class _Reader:
-    """Read launch files: collects the nodes, and the names of all declared arguments."""
+    """Read launch files: collects the nodes, and the names of all declared arguments.
 
-    def __init__(self) -> None:
+    Variables, environment and namespace are those at the present place; elements change them for what follows.
+    """
+
+    def __init__(self, variables: Mapping[str, str], environment: Mapping[str, str]) -> None:
         self.nodes: list[NodeDescription] = []
         self.declared: set[str] = set()
+        self._variables, self._environment, self._namespace = dict(variables), dict(environment), ''
         self._depth = 0
-        self._readers: Mapping[str, Callable[[Element, Scope], None]] = {
+        self._readers: Mapping[str, Callable[[Element], None]] = {
             'arg': self._read_arg,
             'let': self._read_let,
             'set_env': self._read_set_env,
@@ -623,7 +575,7 @@ class _Reader:
             'node': self._read_node,
         }
 
-    def read_file(self, path: Path, scope: Scope) -> None:
+    def read_file(self, path: Path) -> None:
         """Read a file; its nodes join those of other files."""
         root = _root(path)
         if self._depth > MAX_INCLUDES:
@@ -633,98 +585,115 @@ class _Reader:
         self.declared |= set(_declared(root))
         try:
             _check_form(root, 'launch')
-            self._children(root, scope)
+            self._read_children(root)
         except TextureError as error:
             raise type(error)(f'{path.name}: {error}') from error
         self._depth -= 1
 
-    def _children(self, parent: Element, scope: Scope) -> None:
+    def text(self, element: Element, name: str) -> str:
+        """Return an attribute with its substitutions performed."""
+        return expand(_attribute(element, name), self._perform)
+
+    def _perform(self, name: str, arguments: Sequence[str]) -> str:
+        """Return the value of one substitution; UnknownName or InvalidLaunch if it has none."""
+        fewest, most = find(SUBSTITUTIONS, name, 'substitution')
+        if not fewest <= len(arguments) <= most:
+            raise InvalidLaunch(
+                f'$({" ".join([name, *arguments])}) has {len(arguments)} arguments; {fewest} to {most} are needed'
+            )
+        first, *rest = arguments
+        if name == 'find-pkg-share':
+            return str(prefix(first) / 'share' / first)
+        if name == 'not-equals':
+            return 'true' if first != rest[0] else 'false'
+        known = self._variables if name == 'var' else self._environment
+        if first in known:
+            return known[first]
+        if rest:
+            return rest[0]
+        if name == 'var':
+            raise unknown_name(first, known, 'launch variable')
+        raise InvalidLaunch(
+            f"environment variable '{first}' is not set; set it, or give a default: $(env {first} DEFAULT)"
+        )
+
+    def _read_children(self, parent: Element) -> None:
         for element in parent:
             if element.tag not in self._readers:
                 raise unknown_name(element.tag, self._readers, 'launch element')
             _check_form(element, element.tag)
-            if _wanted(element, scope):
-                self._readers[element.tag](element, scope)
+            conditions = [name for name in CONDITIONS if name in element.attrib]
+            where = f'of <{element.tag}>'
+            if all(typed(self.text(element, c), 'bool', f"'{c}' {where}") is CONDITIONS[c] for c in conditions):
+                self._readers[element.tag](element)
 
-    def _read_arg(self, element: Element, scope: Scope) -> None:
+    def _read_arg(self, element: Element) -> None:
         name = _attribute(element, 'name')
-        if name not in scope.variables:
+        if name not in self._variables:
             if 'default' not in element.attrib:
                 raise InvalidLaunch(f"argument '{name}' is required; give {name}:=VALUE")
-            scope.variables[name] = scope.expand(element.attrib['default'])
-        choices = [_attribute(choice, 'value') for choice in element]
-        if choices and scope.variables[name] not in choices:
-            raise InvalidLaunch(
-                f"argument '{name}' is '{scope.variables[name]}'; allowed is one of {', '.join(choices)}"
-            )
+            self._variables[name] = self.text(element, 'default')
+        value, choices = self._variables[name], [_attribute(choice, 'value') for choice in element]
+        if choices and value not in choices:
+            raise InvalidLaunch(f"argument '{name}' is '{value}'; allowed is one of {', '.join(choices)}")
 
-    def _read_let(self, element: Element, scope: Scope) -> None:
-        scope.variables[scope.expand(_attribute(element, 'name'))] = scope.expand(_attribute(element, 'value'))
+    def _read_let(self, element: Element) -> None:
+        self._variables[self.text(element, 'name')] = self.text(element, 'value')
 
-    def _read_set_env(self, element: Element, scope: Scope) -> None:
-        scope.environment[scope.expand(_attribute(element, 'name'))] = scope.expand(_attribute(element, 'value'))
+    def _read_set_env(self, element: Element) -> None:
+        self._environment[self.text(element, 'name')] = self.text(element, 'value')
 
-    def _read_namespace(self, element: Element, scope: Scope) -> None:
-        scope.namespace = joined_namespace(scope.namespace, scope.expand(_attribute(element, 'namespace'))) or '/'
+    def _read_namespace(self, element: Element) -> None:
+        self._namespace = joined_namespace(self._namespace, self.text(element, 'namespace')) or '/'
 
-    def _read_group(self, element: Element, scope: Scope) -> None:
-        self._children(element, scope.copy())
+    def _read_group(self, element: Element) -> None:
+        before = dict(self._variables), dict(self._environment), self._namespace
+        self._read_children(element)
+        self._variables, self._environment, self._namespace = before
 
-    def _read_include(self, element: Element, scope: Scope) -> None:
-        path = Path(scope.expand(_attribute(element, 'file')))
+    def _read_include(self, element: Element) -> None:
+        path = Path(self.text(element, 'file'))
         known = _declared(_root(path))
-        given = {}
-        for item in element:
-            _check_form(item, 'arg of an include')
-            name = scope.expand(_attribute(item, 'name'))
+        given = {self.text(item, 'name'): self.text(item, 'value') for item in element}
+        for name in given:
             if name not in known:
                 raise unknown_name(name, known, f'argument of {path.name}')
-            given[name] = scope.expand(_attribute(item, 'value'))
-        scope.variables.update(given)
-        self.read_file(path, scope)
+        self._variables.update(given)
+        self.read_file(path)
 
-    def _read_node(self, element: Element, scope: Scope) -> None:
-        texts = {name: scope.expand(element.get(name, '')) for name in NODE_TEXTS}
-        _attribute(element, 'pkg')
-        _attribute(element, 'exec')
-        if texts['on_exit'] not in ('', 'shutdown'):
-            raise InvalidLaunch(f"'on_exit' of <node> is '{texts['on_exit']}'; allowed is shutdown")
+    def _read_node(self, element: Element) -> None:
+        texts = {name: self.text(element, name) for name in NODE_TEXTS if name in element.attrib}
+        if (on_exit := texts.get('on_exit', 'shutdown')) != 'shutdown':
+            raise InvalidLaunch(f"'on_exit' of <node> is '{on_exit}'; allowed is shutdown")
+        namespace = joined_namespace(self._namespace, texts.get('namespace', ''))
         self.nodes.append(
             NodeDescription(
-                package=texts['pkg'],
-                executable=texts['exec'],
-                name=texts['name'],
-                namespace=joined_namespace(scope.namespace, texts['namespace'])
-                or '/' * ('namespace' in element.attrib),
-                parameters=tuple(_parameter(item, scope) for item in element.findall('param')),
-                remappings=tuple(_remapping(item, scope) for item in element.findall('remap')),
-                respawn=typed(texts['respawn'] or 'false', 'bool', "'respawn' of <node>"),
-                respawn_delay_s=typed(texts['respawn_delay'] or '0', 'float', "'respawn_delay' of <node>"),
+                package=self.text(element, 'pkg'),
+                executable=self.text(element, 'exec'),
+                name=texts.get('name', ''),
+                namespace=namespace or '/' * ('namespace' in texts),
+                parameters=tuple(self._parameter(item) for item in element.findall('param')),
+                remappings=tuple((self.text(item, 'from'), self.text(item, 'to')) for item in element.findall('remap')),
+                respawn=typed(texts.get('respawn', 'false'), 'bool', "'respawn' of <node>"),
+                respawn_delay_s=typed(texts.get('respawn_delay', '0'), 'float', "'respawn_delay' of <node>"),
                 respawn_max_retries=typed(
-                    texts['respawn_max_retries'] or '-1', 'int', "'respawn_max_retries' of <node>"
+                    texts.get('respawn_max_retries', '-1'), 'int', "'respawn_max_retries' of <node>"
                 ),
-                needed=texts['on_exit'] == 'shutdown',
-                environment=dict(scope.environment),
+                needed='on_exit' in texts,
+                environment=dict(self._environment),
             )
         )
 
-
-def _remapping(element: Element, scope: Scope) -> tuple[str, str]:
-    _check_form(element, 'remap')
-    return scope.expand(_attribute(element, 'from')), scope.expand(_attribute(element, 'to'))
-
-
-def _parameter(element: Element, scope: Scope) -> Path | dict[str, Any]:
-    """Return a parameter file, or a name with its value."""
-    _check_form(element, 'param')
-    if 'from' not in element.attrib:
-        name, text = scope.expand(_attribute(element, 'name')), scope.expand(_attribute(element, 'value'))
-        return {name: typed(text, element.get('type', 'yaml'), f"the value of <param name='{name}'>")}
-    path = Path(scope.expand(element.attrib['from']))
-    if 'name' in element.attrib:
-        raise InvalidLaunch(f"<param from='{path}'> also has a name; the file holds the names")
-    if not path.is_file():
-        if path.parts[-4:-1] == ('texture_bringup', 'config', 'robots'):
-            raise unknown_name(path.stem, [item.stem for item in path.parent.glob('*.yaml')], 'preset')
-        raise InvalidLaunch(f"there is no parameter file '{path}'; give the path of one")
-    return path
+    def _parameter(self, element: Element) -> Path | dict[str, Any]:
+        """Return a parameter file, or a name with its value."""
+        if 'from' not in element.attrib:
+            name, kind = self.text(element, 'name'), element.get('type', 'yaml')
+            return {name: typed(self.text(element, 'value'), kind, f"the value of <param name='{name}'>")}
+        path = Path(self.text(element, 'from'))
+        if 'name' in element.attrib:
+            raise InvalidLaunch(f"<param from='{path}'> also has a name; the file holds the names")
+        if not path.is_file():
+            if path.parts[-4:-1] == ('texture_bringup', 'config', 'robots'):
+                raise unknown_name(path.stem, [item.stem for item in path.parent.glob('*.yaml')], 'preset')
+            raise InvalidLaunch(f"there is no parameter file '{path}'; give the path of one")
+        return path
