@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The demonstration, shortened; what it prints is tested where it is made."""
 
-import json
 import os
 import re
 import signal
@@ -101,24 +100,20 @@ def test_an_aborted_slide_and_a_rejected_one_over_a_trained_surface_are_made_aga
 
 
 @pytest.mark.ros
-def test_it_accepts_trained_surfaces_and_rejects_others_and_leaves_models_answers_and_picture(
-    tmp_path, monkeypatch, capsys
-) -> None:
+def test_it_accepts_trained_surfaces_and_rejects_others_and_leaves_a_picture(tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.setattr(demo, 'RECOGNISED', ('glass', 'ridge_2mm_deep'))
     monkeypatch.setattr(demo, 'UNTRAINED', ('cardboard',))
     right = demo.demonstrate(tmp_path / 'demo', 'default', 0, ProgressLog())
     said = capsys.readouterr().out
     assert right, said
-    slides = {slide['title']: slide for slide in json.loads((tmp_path / 'demo/demo.json').read_text())['slides']}
-    assert slides.pop('cardboard')['rejection'] in ('NOVEL', 'AMBIGUOUS')
-    assert {title: slide['rejection'] for title, slide in slides.items() if title != 'over the edge'} == {
-        'glass': 'NONE',
-        'ridge_2mm_deep': 'NONE',
-        'ridge_2mm_deep at 0.02 m/s': 'OUTSIDE_TRAINING',
-    }
-    assert slides['glass']['decided']
-    assert slides['over the edge']['outcome'].startswith('the contact with the surface was lost')
-    assert re.search(r'rejected, outside the training: speed 0\.0[12]\d* m/s', said)
+    for line in (
+        r'✓ glass +accepted as glass after [\d.]+ s, ended early',
+        r'✓ ridge_2mm_deep +accepted as ridge_2mm_deep',
+        r'✓ cardboard +rejected, (novel|ambiguous)',
+        r'✓ ridge_2mm_deep at 0\.02 m/s +rejected, outside the training: speed 0\.0[12]\d* m/s',
+        r'✓ over the edge +the contact with the surface was lost',
+    ):
+        assert re.search(line, said), said
     assert (tmp_path / 'demo/demo.png').stat().st_size > 10_000
 
 

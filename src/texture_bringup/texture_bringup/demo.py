@@ -18,7 +18,6 @@ import numpy as np
 
 from texture_bringup.launcher import ChildLauncher
 from texture_bringup.operator import ExplorationResult, Operator
-from texture_core.config import write_json
 from texture_core.errors import ExplorationError, InvalidData, LaunchFailed
 from texture_core.types import ExplorationRequest, Rejection, TextureEstimate
 from texture_evaluation.charts import COLOURS, chart
@@ -145,7 +144,7 @@ class ProgressLog:
 # The demonstration from beginning to end.
 
 TRAINING, MODEL, ROUGHNESS = 'training', 'model', 'roughness'  # in the folder of the results
-PICTURE, FIGURES, LOG, GRADES = 'demo.png', 'demo.json', 'nodes.log', 'grades.csv'
+PICTURE, LOG, GRADES = 'demo.png', 'nodes.log', 'grades.csv'
 
 
 def _clear(folder: Path) -> None:
@@ -154,7 +153,7 @@ def _clear(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         shutil.rmtree(folder / TRAINING, ignore_errors=True)
         models = (f'{name}{ending}' for name in (MODEL, ROUGHNESS) for ending in ('.npz', '.json'))
-        for file in (PICTURE, FIGURES, LOG, GRADES, *models):
+        for file in (PICTURE, LOG, GRADES, *models):
             (folder / file).unlink(missing_ok=True)
     except OSError as error:
         raise InvalidData(f"'{folder}' cannot be used: {error.strerror}; name another with --out") from error
@@ -265,25 +264,11 @@ def slide_over(
 
 
 def _report(slides: Sequence[Slide], out: Path, progress: ProgressLog) -> None:
-    """Store the answers and draw the picture."""
-    figures = [
-        {
-            'surface': slide.surface,
-            'title': slide.title,
-            'as_expected': slide.as_expected,
-            'outcome': slide.outcome,
-            'label': slide.answer.texture.label,
-            'rejection': slide.answer.texture.rejection.name,
-            'decided': slide.answer.texture.decided,
-            'evidence_s': slide.answer.texture.evidence_s,
-        }
-        for slide in slides
-    ]
-    write_json({'slides': figures}, out / FIGURES)
+    """Draw the picture, and count the answers that are right."""
     draw([slide for slide in slides if slide.expected], out / PICTURE)
     right = sum(slide.as_expected for slide in slides)
     progress.section(f'Done: {right} of {len(slides)} results as expected. Look at {out / PICTURE}')
-    progress.line(f'training slides, models, answers and the log of the nodes are in {out}/')
+    progress.line(f'training slides, models and the log of the nodes are in {out}/')
 
 
 def draw(slides: Sequence[Slide], path: Path) -> None:
