@@ -167,9 +167,7 @@ class Fragile(LifecycleNode):
 
 
 @pytest.mark.realtime
-def test_nodes_are_activated_and_deactivated_over_the_states_between_and_a_refusal_is_reported(
-    asked, monkeypatch, capsys
-):
+def test_running_nodes_are_activated_and_deactivated_and_called_and_a_refusal_is_reported(asked, monkeypatch, capsys):
     monkeypatch.setenv('ROS_DOMAIN_ID', '97')
     with LocalGraph(97, deadline_s=60.0) as graph:
         node = graph.add(Fragile)
@@ -178,13 +176,7 @@ def test_nodes_are_activated_and_deactivated_over_the_states_between_and_a_refus
             assert capsys.readouterr().out == f'fragile: {state}\n'
         node.broken = True
         assert asked(graph, 'activate', 'fragile') == 2
-    assert "node 'fragile' is inactive and refuses to change" in capsys.readouterr().err
-
-
-@pytest.mark.realtime
-def test_the_answer_of_a_running_node_is_printed(asked, monkeypatch, capsys):
-    monkeypatch.setenv('ROS_DOMAIN_ID', '97')
-    with LocalGraph(97, deadline_s=60.0) as graph:
+        assert "node 'fragile' is inactive and refuses to change" in capsys.readouterr().err
         graph.peer.create_service(
             Trigger, 'explorer/recover', lambda _request, _answer: Trigger.Response(message='it burns')
         )
