@@ -494,11 +494,11 @@ def _check(options: argparse.Namespace) -> int:
 
 def plate_request(options: argparse.Namespace, stored: Mapping[str, float]) -> ExplorationRequest:
     """Return the slide over the plate: an option goes before what is stored with the reference."""
-    numbers: dict[str, Any] = {field: stored.get(field, usual) for field, _, _, usual in PLATE_NUMBERS.values()}
-    given = {option: getattr(options, option) for option in PLATE_NUMBERS}
-    if given['direction'] is not None:
-        given['direction'] = math.radians(given['direction'])
-    numbers |= {PLATE_NUMBERS[option][0]: value for option, value in given.items() if value is not None}
+    numbers: dict[str, Any] = {}
+    for option, (field, _, _, usual) in PLATE_NUMBERS.items():
+        given = getattr(options, option)
+        in_rad = math.radians if option == 'direction' else float
+        numbers[field] = stored.get(field, usual) if given is None else in_rad(given)
     return ExplorationRequest('linear_slide', surface=PLATE, **numbers)
 
 
