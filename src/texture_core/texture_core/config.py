@@ -148,7 +148,8 @@ def shipped(package: str, subfolder: str, suffix: str = '.yaml') -> dict[str, Pa
     found = {}
     for name in (*sorted(others, reverse=True), package):  # the last one counts
         for item in sorted(folder(name, subfolder).glob(f'*{suffix}')):
-            found[item.name.removesuffix(suffix)] = item
+            if item.is_file():  # no link of an older installation
+                found[item.name.removesuffix(suffix)] = item
     return found
 
 
