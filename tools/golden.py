@@ -24,7 +24,6 @@ import json
 import math
 import os
 import struct
-import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -51,6 +50,7 @@ from texture_exploration.explorer import Explorer
 from texture_exploration.safety import SafetyLimits
 from texture_exploration.touch import TouchParams
 from texture_recordings.dataset import SlideDataset
+from texture_recordings.public_sets import IMPORTS
 from texture_simulation.devices import dynamixel, rails
 from texture_simulation.offline import SlidePlan, write_simulated
 
@@ -256,8 +256,7 @@ def _recipes(source: GoldenSlides) -> list[str]:
 def _bags(source: GoldenSlides, folder: Path) -> list[Path]:
     """Write the bags of a source; a second set along y lies in a separate folder."""
     if source.data_set:
-        command = ['texture', 'import', source.data_set, str(DATA), str(folder / 'x'), '--slides', '1-7']
-        subprocess.run([*command, '--materials', *source.surfaces], check=True, stdout=subprocess.DEVNULL)
+        IMPORTS[source.data_set](DATA / source.data_set, folder / 'x', '1-7', source.surfaces)
     else:
         rng = np.random.default_rng(SEED)
         write_simulated(folder / 'x', source.plan, rng, source.scene, source.surfaces)
@@ -453,10 +452,10 @@ def _hand(recording: Recording) -> dict[str, Any]:
 
 
 def _ros_controllers(recording: Recording) -> dict[str, Any]:
-    harness = importlib.import_module('test_ros_controllers')
+    harness = importlib.import_module('twist_robot')
     robot = harness.Robot(harness.TwistControllerParams(jitter_s=0.0))
     recording.listen(robot, 'send_velocity', list)
-    return recording.stepped(robot.driven, lambda: robot.now_ns, lambda: robot.pass_time(0.01))
+    return recording.stepped(robot.arm, lambda: robot.now_ns, lambda: robot.pass_time(0.01))
 
 
 def _ur(recording: Recording) -> dict[str, Any]:

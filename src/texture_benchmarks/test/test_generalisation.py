@@ -12,16 +12,18 @@ from texture_benchmarks.generalisation import (
     DECIDED,
     DISTANCE,
     END,
+    HALVES,
     SPACING,
     Answer,
+    Source,
     Trial,
-    TrialSet,
     answers_of,
     figures,
     names_of,
 )
 from texture_benchmarks.peers import SVC, recipe_of
 from texture_benchmarks.study import BenchmarkOptions
+from texture_core.errors import InvalidData, UnknownName
 from texture_recordings.dataset import SlideDataset
 
 RATE_HZ = 100.0
@@ -52,7 +54,7 @@ def test_adjacent_parts_are_joined_to_one_stretch_of_the_slide() -> None:
 
 
 def test_each_cell_is_trained_once_and_tested_at_every_distance() -> None:
-    cells = generalisation._cells(slides(8.0, count=80, speed_m_s=0.02).in_parts(8))
+    _, cells = generalisation._cells(slides(8.0, count=80, speed_m_s=0.02))
     alone = [one for one in cells if (DISTANCE, '0') in one.tested]
     assert len(alone) == 8 * len(generalisation.DRAWS)
     # From the end of the track there is one cell seven cells away; from inside there are two at most distances.
@@ -81,44 +83,61 @@ def test_the_worst_time_counts_for_accepted_but_wrong() -> None:
 def test_a_control_tells_surfaces_that_were_slid_over_in_different_directions() -> None:
     made = slides(count=8, direction_rad=[0.0, 1.5] * 4)
     names = made.names.tolist()
-    trials = TrialSet('t', made, [Trial('', names, {('halves', 'same'): names})])
-    [(cell, answers)] = answers_of(trials, 0, recipe_of, 'direction alone')
-    assert cell == ('halves', 'same', 'direction alone', '')
+    trials = [Trial('', names, {('halves', 'same'): names})]
+    [(cell, answers)] = answers_of('t', (made, trials), recipe_of, 'direction alone')
+    assert cell == ('halves', 'same', '')
     assert all(one.ends[END][0] == one.surface for one in answers)
 
 
 def test_what_is_trained_from_either_end_lies_in_no_test_of_another_stretch() -> None:
     trained, rows = generalisation.GAPS[1]
-    made = generalisation._stretches(rows, trained, slides(8.0, count=80))
-    [first, turned, *_] = made.trials
+    _, [first, turned, *_] = generalisation._stretches(rows, trained, slides(8.0, count=80))
     [places] = [{name.rpartition(' part ')[2] for name in one} for one in first.tested.values()]
     assert {name.rpartition(' part ')[2] for name in first.trained} == {'0-4/10'}
     assert places == {'6-10/10'} == {name.rpartition(' part ')[2] for name in turned.trained}
 
 
 def test_what_is_finished_is_not_computed_again_and_what_is_not_is_named(tmp_path: Path) -> None:
-    options = BenchmarkOptions(tmp_path, quick=True, workers=1)
-    cell = figures([ended('cork', 'cork', accepted=True, cluster='a')])
-    line = {'part': f'simulated halves, {SVC}', 'cells': [[DISTANCE, '0', SVC, cell]]}
+    options = BenchmarkOptions(tmp_path, only='simulated track', budget_s=0.01)
+    row, cell = 'simulated, no gap', figures([ended('cork', 'cork', accepted=True, cluster='a')])
+    line = {'part': f'simulated track, {SVC}', 'found': [[HALVES, row, SVC, cell]]}
     (tmp_path / generalisation.FINISHED).write_text(json.dumps(line) + '\n')
-    result = generalisation.run(replace(options, budget_s=0.01))
-    assert result.numbers['missing'] == ['simulated halves, default']
-    assert result.numbers[DISTANCE]['0'] == {SVC: json.loads(json.dumps(cell))}
+    numbers = generalisation.run(options).numbers
+    assert numbers['missing'][:3] == [
+        'simulated track, default',
+        'cells (not chosen)',
+        'same half, no gap (not chosen)',
+    ]
+    assert numbers[HALVES] == {row: {SVC: json.loads(json.dumps(cell))}}
+
+
+def test_without_some_sets_the_others_are_measured_and_these_are_named(tmp_path: Path, monkeypatch, capsys) -> None:
+    (tmp_path / 'here').mkdir()
+    made = slides(count=8, direction_rad=[0.0, 1.5] * 4)
+    trial = Trial('', made.names.tolist(), {(HALVES, 'a row'): made.names.tolist()})
+    source = Source(lambda _options: made, {'a part': (('direction alone',), lambda whole: (whole, [trial]))})
+    monkeypatch.setattr(generalisation, 'SETS', {'here': source, 'gone': source})
+    options = BenchmarkOptions(tmp_path / 'out', tmp_path)
+    numbers = generalisation.run(options).numbers
+    assert numbers['missing'] == ['a part (no recordings)']
+    assert numbers[HALVES]['a row']['direction alone']['accuracy'] == 1.0
+    assert f"'{tmp_path}' has no gone, left out; `--only SET` measures one of here alone" in capsys.readouterr().out
+    with pytest.raises(InvalidData, match='give the folder that holds gone/ with --data'):
+        generalisation.run(replace(options, only='gone'))
+    with pytest.raises(UnknownName, match="did you mean 'here'"):
+        generalisation.run(replace(options, only='hare'))
 
 
 def test_names_are_of_the_requested_places() -> None:
     assert names_of(slides().in_parts(2), '2', '2/2') == ['cork/2 part 2/2', 'felt/2 part 2/2']
 
 
+@pytest.mark.benchmark
 def test_a_reduced_run_tests_recipe_and_peer_near_and_far(tmp_path: Path) -> None:
-    result = generalisation.run(BenchmarkOptions(tmp_path, quick=True))
-    for row in ('0', '1'):
-        assert set(result.numbers[DISTANCE][row]) == {'default', SVC}
-    assert (tmp_path / 'generalisation.png').exists()
+    numbers = generalisation.run(BenchmarkOptions(tmp_path, quick=True)).numbers
     assert not (tmp_path / generalisation.FINISHED).exists()  # all is in the JSON
-    near, far = (result.numbers[DISTANCE][row]['default'] for row in ('0', '1'))
-    assert near['accuracy'] > 0.8
-    assert near['accepted_correct'] + near['accepted_wrong'] + sum(near['rejections'].values()) / near['slides'] == (
-        pytest.approx(1.0)
-    )
-    assert far['slides'] == near['slides']
+    near, far = (numbers[HALVES][row] for row in ('simulated, same half', 'simulated, gap of 2.2 cm'))
+    assert set(near) == set(far) == {'default', SVC}
+    assert near['default']['accuracy'] > far['default']['accuracy']
+    parts = near['default']['accepted_correct'], near['default']['accepted_wrong'], near['default']['rejections']
+    assert parts[0] + parts[1] + sum(parts[2].values()) / near['default']['slides'] == pytest.approx(1.0)

@@ -7,9 +7,8 @@ from pathlib import Path
 import pytest
 
 from texture_benchmarks.catalogue import run_benchmark
-from texture_benchmarks.force_trials import ForceTrial, Sweep, explored, ran, read_sweep
+from texture_benchmarks.motion import ForceTrial, explored
 from texture_benchmarks.study import BenchmarkOptions
-from texture_core.errors import InvalidData
 
 MOST_N = {
     'stiffness as declared': 6.0,
@@ -43,17 +42,6 @@ def test_a_force_100_ms_late_by_stamps_of_arrival_is_named_and_no_success():
     found = explored(ForceTrial('late', 20000.0, delay_s=0.02, late_force_s=0.1))
     assert found.end == 'ARM_FAULT'
     assert "later than 'loop_delay_s'" in found.message
-
-
-def test_the_trials_of_another_machine_are_read_as_they_were_run_and_what_had_no_time_is_missing(tmp_path):
-    planned = [ForceTrial('two', found_s=0.5, phase='rise'), ForceTrial('one', phase='rise', bad='force 0 nan')]
-    found = ran(planned)
-    assert [trial for trial, _ in found] == planned
-    Sweep(1, 2, found).write(tmp_path)
-    assert read_sweep(tmp_path) == Sweep(1, 2, found)
-    assert ran(planned, budget_s=0.0) == []
-    with pytest.raises(InvalidData, match='holds no trials'):
-        read_sweep(tmp_path / 'nowhere')
 
 
 @pytest.mark.benchmark

@@ -19,7 +19,6 @@ from texture_benchmarks.scenes import (
     difference,
     extract_features,
     variants,
-    with_one_more,
 )
 from texture_benchmarks.study import BenchmarkOptions
 from texture_simulation.effects import EFFECTS
@@ -48,7 +47,7 @@ def test_every_band_holds_the_power_of_its_frequencies() -> None:
 
 def test_a_term_that_decides_is_found_and_one_that_does_nothing_changes_nothing() -> None:
     scene = two_ridges(noise={'fast_count': 300.0}, unevenness={'relative': 1e-6})
-    terms = ablate(scene, TOUCHING, 80, 4, 0)
+    terms = ablate(scene, variants(scene, TOUCHING), TOUCHING, 80, repeats=4, seed=0)
     easier = terms['noise']['accuracy_without']
     assert easier['change'] > max(0.05, easier['half_interval'])
     assert abs(terms['unevenness']['accuracy_trained_without']['change']) < 0.05
@@ -82,14 +81,12 @@ def test_every_effect_is_named_by_a_scene_or_measured_by_itself() -> None:
     named = {effect for scene in scenes_of_all for effect in scene.effects}
     assert named | set(ADDED) == set(EFFECTS)
     assert not named & set(ADDED)
-    assert {name for scene in with_one_more(two_ridges()).values() for name in scene.effects} == set(ADDED)
 
 
 @pytest.mark.benchmark
 def test_scenes_are_cheap_and_every_term_is_weighed(tmp_path: Path) -> None:
     result = BENCHMARKS['scenes'](BenchmarkOptions(tmp_path, quick=True))
     numbers = result.numbers
-    assert result.write(tmp_path).is_file()
     assert all(drawn.is_file() for drawn in result.charts)
     assert numbers['scan_ms']['ets_linear']['together_ms'] < 10
     assert set(load_scene('ets_linear').effects) < set(numbers['terms']['ets_linear'])

@@ -9,28 +9,33 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
-from texture_benchmarks.study import BenchmarkOptions, accuracy_interval, finished_forked, imported, map_forked
+from texture_benchmarks.study import BenchmarkOptions, accuracy_interval, map_forked, recorded, resumed
 from texture_core.errors import InvalidData
 
 
-def test_a_job_that_fails_or_lasts_too_long_leaves_the_others(capsys) -> None:
+def test_a_part_that_fails_or_lasts_too_long_leaves_the_others_and_none_is_computed_twice(tmp_path, capsys) -> None:
     def work(job):
         if job == 'waits':
             threading.Event().wait()
         return 1 / job
 
-    found = dict(finished_forked(work, [1, 0, 'waits', 2], workers=3, budget_s=5.0))
-    assert found == {1: 1.0, 2: 0.5}
+    options = BenchmarkOptions(tmp_path, budget_s=5.0)
+    jobs = {'one': 1, 'zero': 0, 'two': 2, 'late': 'waits'}
+    assert resumed(work, jobs, tmp_path / 'parts.jsonl', options) == {'one': 1.0, 'two': 0.5}
     printed = capsys.readouterr().out
-    assert '0 failed: ZeroDivisionError' in printed
+    assert 'zero failed: ZeroDivisionError' in printed
     assert 'ended after 5 s' in printed
+    found = resumed(lambda _job: 'again', jobs, tmp_path / 'parts.jsonl', options)
+    assert found == {'one': 1.0, 'zero': 'again', 'two': 0.5, 'late': 'again'}
+    assert '2 parts are of an earlier run' in capsys.readouterr().out
+    assert not (tmp_path / 'parts.jsonl').exists()
 
 
 @pytest.mark.parametrize('data', [True, False])
 def test_what_is_missing_is_reported_by_the_benchmark_that_needs_it(tmp_path: Path, data: bool) -> None:
     options = BenchmarkOptions(tmp_path, tmp_path if data else None)
-    with pytest.raises(InvalidData, match='cork/ with --data'), imported(options, 'cork'):
-        pass
+    with pytest.raises(InvalidData, match='ntp21/ with --data'):
+        recorded(options, 'ntp21')
 
 
 def test_each_job_is_done_in_its_place_with_what_could_not_be_sent() -> None:

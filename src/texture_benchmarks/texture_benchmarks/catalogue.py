@@ -1,12 +1,10 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Studies by name, and how all of them run: each in a separate process, so that one that fails stops no other."""
+"""Studies by name."""
 
 from __future__ import annotations
 
-import multiprocessing
-import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -33,32 +31,17 @@ BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
     'generalisation': generalisation.run,  # against the distance from what was trained: place, day, finger, run
     'papers': papers.run,  # the papers' recipes on recordings, at the same and at another place of a track
     'trust': trust.run,  # where recognition fails: how slides end under disturbances and over unknown materials
-    'roughness': latency.run_roughness,  # from window to grade
+    'roughness-latency': latency.run_roughness,  # from window to grade
     'learning': learning.run,  # textures added slide by slide, and slides needed with chosen motions
     'motion': motion.run,  # force, speed and circle by robot and surface; where force control is stable
     'scenes': scenes.run,  # cost of simulated slides and devices; what each term of a scene contributes
 }
-# What explains rather than measures how well and how fast surfaces are recognised, and what takes ten minutes or more.
-LONG = frozenset({'generalisation', 'motion', 'overview', 'scale', 'scenes', 'trust'})
-
-Act = Callable[[str], int]  # runs a study by its name and returns the exit code of its process
 
 
 def run_benchmark(name: str, options: BenchmarkOptions) -> tuple[BenchmarkResult, Path]:
     """Run one study; return its result and the JSON file, with the charts next to it."""
-    result = find(BENCHMARKS, name, 'benchmark')(options)
+    run = find(BENCHMARKS, name, 'benchmark')
+    result = run(options)
     if options.quick:
         result = replace(result, data=f'REDUCED, not for publishing; part of: {result.data}')
-    return result, result.write(options.out)
-
-
-def run_all(names: Sequence[str], act: Act) -> dict[str, int]:
-    """Run the act for each name in a separate process; return the exit codes, below 0 of what was killed."""
-    context = multiprocessing.get_context('fork')  # nothing is imported again
-    codes = {}
-    for name in names:
-        process = context.Process(target=lambda name=name: sys.exit(act(name)))
-        process.start()
-        process.join()
-        codes[name] = process.exitcode or 0
-    return codes
+    return result, result.write(options.out, name, run.__doc__)

@@ -4,12 +4,11 @@
 
 from __future__ import annotations
 
-import json
 import math
 import time
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import groupby
 from pathlib import Path
@@ -20,27 +19,24 @@ from sklearn.discriminant_analysis import QuadraticDiscriminantAnalysis
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from texture_benchmarks import peers
 from texture_benchmarks.peers import SVC, recipe_of
 from texture_benchmarks.study import (
     DATA,
     BenchmarkOptions,
     BenchmarkResult,
-    finished_forked,
-    imported,
-    map_forked,
+    fraction_interval,
+    recorded,
+    resumed,
     with_spaced_windows,
 )
-from texture_benchmarks.trust import TRAINED, simulate
-from texture_core.errors import InvalidData
-from texture_core.types import NANOSECONDS, Phase, TextureEstimate, join_batches
+from texture_core.config import find
+from texture_core.types import NANOSECONDS, Phase, join_batches
 from texture_estimation.recipe import FAST_TOPIC, Recipe
 from texture_estimation.training import train
 from texture_evaluation.charts import COLOURS, chart
-from texture_evaluation.cross_validation import interval, predict_slides
-from texture_evaluation.metrics import TIMES_S
+from texture_evaluation.cross_validation import predict_slides
+from texture_evaluation.metrics import TIMES_S, SlideResult
 from texture_evaluation.train import training_examples
-from texture_features.windows import WindowParams
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.slides import LabelledSlide
 from texture_simulation.offline import simulate_slides
@@ -80,10 +76,9 @@ SPIDER_HZ, SPIDER_TRAINED = 15.6, '2024-02-13'
 SPIDER = {'2024-02-13b': 'same day', '2024-02-20am1': 'other day', '2024-02-20am2': 'other day',
           '2024-02-21_sensor2': 'other specimen'}  # fmt: skip
 BOREAL_HZ, BOREAL_S, BOREAL_SLIDES, BOREAL_TRAINED = 100.0, 5.0, 12, 0.6  # slides of a run at most, and trained runs
-# For every draw; networks take ten times as long.
+# For every draw.
 QUICK_RECIPES = ('any-place-and-taxels', 'any-place', SVC, 'force and speed alone', 'direction alone')
 LONG_NS = 2_000_000_000  # slides from here on have enough windows 0.5 s apart
-PEER_WINDOWS = WindowParams(length_s=0.5, hop_s=0.25)
 
 
 class Trial(NamedTuple):
@@ -95,13 +90,7 @@ class Trial(NamedTuple):
     all_recipes: bool = True  # or those alone that train within seconds
 
 
-@dataclass(frozen=True, eq=False)
-class TrialSet:
-    """Slides whose features are computed once for each recipe, and the trials among them."""
-
-    name: str
-    slides: SlideDataset
-    trials: Sequence[Trial]
+Trials = tuple[SlideDataset, Sequence[Trial]]  # slides whose features are computed once, and the trials among them
 
 
 class Answer(NamedTuple):
@@ -114,15 +103,14 @@ class Answer(NamedTuple):
 
 
 END, DECIDED = 'end', 'decided'
-Cell = tuple[str, str, str, str]  # table, row, recipe, draw
+Cell = tuple[str, str, str]  # table, row, draw
 Figures = tuple[str, str, str, dict[str, Any]]  # table, row, recipe, figures
-Reader = Callable[[BenchmarkOptions], SlideDataset]
-Readers = Mapping[str, Reader]
-FINISHED = 'generalisation.jsonl'  # a line for each recipe on each set, as it is finished
-SLOW = ('default', 'vibration-and-taxels')  # begin first; the convolutional network last
+FINISHED = 'generalisation.jsonl'  # a line for each recipe on each part, as it is finished
+SLOW = ('default', 'vibration-and-taxels')  # begin first
+QUICK_SET = 'simulated track'
 
 
-def run(options: BenchmarkOptions, readers: Readers | None = None) -> BenchmarkResult:
+def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Train recipes and peers at some places, days or fingers, and test them on other slides there and elsewhere.
 
     Accuracy at the end of a slide, slides accepted and correct, and accepted but wrong; the largest fraction accepted
@@ -130,63 +118,51 @@ def run(options: BenchmarkOptions, readers: Readers | None = None) -> BenchmarkR
     as accepted. 95 % intervals by bootstrap over surface × part, date or run: slides over one track are no independent
     draws.
     """
-    sets = REDUCED if options.quick else SETS
-    slides = _read_all(list(dict.fromkeys(one.data for one in sets.values())), options, readers or READERS)
-    parts = [(name, recipe) for name, one in sets.items() for recipe in one.recipes if one.data in slides]
-    if not peers.available(peers.CNN):
-        parts = [part for part in parts if part[1] != peers.CNN]
-    # What was finished before, in the same folder, is not computed again.
-    path = options.out / FINISHED
-    options.out.mkdir(parents=True, exist_ok=True)
-    found = _finished(path)
-    if found:
-        print(f"{len(found)} parts are of an earlier run, from '{path}'; remove it to compute all again", flush=True)
-    left = [part for part in parts if ', '.join(part) not in found]
-    left.sort(key=lambda part: (part[1] == peers.CNN, part[1] not in SLOW))
-    work = partial(_run_part, slides, options.seed)
-    with path.open('a', encoding='utf-8') as file:
-        for part, cells in finished_forked(work, left, options.workers, options.budget_s):
-            found[', '.join(part)] = cells
-            file.write(json.dumps({'part': ', '.join(part), 'cells': cells}) + '\n')
-            file.flush()
-    missing = [part for part in map(', '.join, parts) if part not in found]
-    missing += [f'{name} (no recordings)' for name, one in sets.items() if one.data not in slides]
-    if not missing:
-        path.unlink()
-    return result_of(found, missing, options)
+    only = options.only or (QUICK_SET if options.quick else '')
+    chosen = {only: find(SETS, only, 'data set')} if only else SETS
+    slides = _read(chosen, options)
+    parts = {
+        f'{part}, {recipe}': (name, part, recipe)
+        for name in slides
+        for part, (recipes, _) in chosen[name].parts.items()
+        for recipe in recipes
+    }
+    order = sorted(parts, key=lambda name: parts[name][2] not in SLOW)
+    work = partial(_run_part, slides)
+    found = resumed(work, {name: parts[name] for name in order}, options.out / FINISHED, options)
+    numbers: dict[str, Any] = {table: {} for table in (DISTANCE, SPACING, HALVES, OTHER)}
+    for table, row, recipe, cell in (one for name in parts if name in found for one in found[name]):
+        numbers[table].setdefault(row, {})[recipe] = cell
+    absent = {name: 'no recordings' if name in chosen else 'not chosen' for name in SETS if name not in slides}
+    numbers['missing'] = [name for name in parts if name not in found]
+    numbers['missing'] += [f'{part} ({why})' for name, why in absent.items() for part in SETS[name].parts]
+    whole = all(numbers[table] for table in (DISTANCE, SPACING, OTHER))
+    return BenchmarkResult(
+        data=DATA_SETS,
+        split=SPLIT,
+        numbers=numbers,
+        charts=(generalisation_chart(numbers, options.out / 'generalisation.png'),) if whole else (),
+    )
 
 
-def _read_all(names: Sequence[str], options: BenchmarkOptions, readers: Readers) -> dict[str, SlideDataset]:
-    """Return the sets that are there, by their names; where no recorded one is, refuse with what the first lacks."""
-    read = {name: _read(readers[name], options) for name in names}
-    slides = {name: found for name, found in read.items() if isinstance(found, SlideDataset)}
-    refused = [error for error in read.values() if isinstance(error, InvalidData)]
-    if refused and all(name.startswith('simulated') for name in slides):
-        raise refused[0]
-    for error in refused:
-        print(f'generalisation: {error}', flush=True)
-    return slides
+def _read(chosen: Mapping[str, Source], options: BenchmarkOptions) -> dict[str, SlideDataset]:
+    """Return the sets that are there, by name; where no recorded one is, refuse with what the first lacks."""
+    absent = [name for name in chosen if not name.startswith('simulated') and not options.has(name)]
+    there = [name for name in chosen if name not in absent]
+    if absent and all(name.startswith('simulated') for name in there):
+        options.recordings(absent[0])
+    if absent:
+        left_out = f"'{options.data}' has no {', '.join(absent)}, left out"
+        print(f'generalisation: {left_out}; `--only SET` measures one of {", ".join(there)} alone', flush=True)
+    return {name: chosen[name].read(options) for name in there}
 
 
-def _read(reader: Reader, options: BenchmarkOptions) -> SlideDataset | InvalidData:
-    try:
-        return reader(options)
-    except InvalidData as error:
-        return error
-
-
-def _finished(path: Path) -> dict[str, list[Figures]]:
-    """Return the figures of the parts in a file, by their names."""
-    lines = path.read_text(encoding='utf-8').splitlines() if path.is_file() else []
-    return {line['part']: line['cells'] for line in map(json.loads, lines)}
-
-
-def _run_part(slides: Mapping[str, SlideDataset], seed: int, part: tuple[str, str]) -> list[Figures]:
-    """Return table, row and figures of each cell of one recipe on one set."""
-    name, recipe = part
-    source = {**SETS, **REDUCED}[name]
+def _run_part(slides: Mapping[str, SlideDataset], part: tuple[str, str, str]) -> list[Figures]:
+    """Return table, row and figures of each cell of one recipe on one part."""
+    source, name, recipe = part
     found: defaultdict[tuple[str, str], dict[str, list[Answer]]] = defaultdict(lambda: defaultdict(list))
-    for (table, row, _, draw), answers in answers_of(source.make(slides[source.data]), seed, recipe_of, recipe):
+    _, make = SETS[source].parts[name]
+    for (table, row, draw), answers in answers_of(name, make(slides[source]), recipe_of, recipe):
         found[table, row][draw] += answers
     return [(table, row, recipe, _pooled(draws)) for (table, row), draws in found.items()]
 
@@ -202,38 +178,35 @@ def _pooled(draws: Mapping[str, Sequence[Answer]]) -> dict[str, Any]:
 
 
 # --------------------
-# One recipe on one set.
+# One recipe on one part.
+
+# Returns how slides end and why one was rejected, by their names.
+Tested = Callable[[Sequence[str]], Mapping[str, tuple[Mapping[str, tuple[str, bool]], str]]]
 
 
 def answers_of(
-    trials: TrialSet, seed: int, recipe_named: Callable[[str], Recipe], name: str
+    part: str, trials: Trials, recipe_named: Callable[[str], Recipe], name: str
 ) -> list[tuple[Cell, list[Answer]]]:
-    """Return what a recipe answers in each trial of a set; its features are computed once."""
-    slides = {one.name: one for one in trials.slides}
+    """Return what a recipe answers in each trial of a part; its features are computed once."""
+    dataset, all_trials = trials
+    slides = {one.name: one for one in dataset}
     if name in CONTROLS:
         fit: Callable[[Sequence[str]], Tested] = partial(_control, slides, CONTROLS[name])
-    elif name in peers.CLASSIFIERS:
-        topics = sorted(trials.slides[0].signals)
-        windows = {key: peers.windows_of(one, topics, PEER_WINDOWS) for key, one in slides.items()}
-        fit = partial(_peer, slides, windows, name, seed)
     else:
-        long = trials.slides[0].sliding[-1].stamp_ns - trials.slides[0].sliding[0].stamp_ns > LONG_NS
+        long = dataset[0].sliding[-1].stamp_ns - dataset[0].sliding[0].stamp_ns > LONG_NS
         recipe = with_spaced_windows(recipe_named(name)) if name == SVC and long else recipe_named(name)
-        fit = _recipe(trials.slides, recipe, accepts_all=name == SVC)
+        fit = _recipe(dataset, recipe, accepts_all=name == SVC)
     found = []
-    chosen = [one for one in trials.trials if one.all_recipes or name in QUICK_RECIPES]
+    chosen = [one for one in all_trials if one.all_recipes or name in QUICK_RECIPES]
     for number, trial in enumerate(chosen, 1):
         began_s = time.monotonic()
         test = fit(trial.trained)
         for (table, row), names in trial.tested.items():
-            answers = [one._replace(cluster=_cluster(slides[key])) for key, one in test(names).items()]
-            found.append(((table, row, name, trial.draw), answers))
+            answers = [Answer(_cluster(slides[key]), slides[key].surface, *end) for key, end in test(names).items()]
+            found.append(((table, row, trial.draw), answers))
         took = f'{time.monotonic() - began_s:.0f} s'
-        print(f'{trials.name}, {name}: {number} of {len(chosen)} trainings, {took}', flush=True)
+        print(f'{part}, {name}: {number} of {len(chosen)} trainings, {took}', flush=True)
     return found
-
-
-Tested = Callable[[Sequence[str]], Mapping[str, Answer]]
 
 
 def _recipe(slides: SlideDataset, recipe: Recipe, *, accepts_all: bool) -> Callable[[Sequence[str]], Tested]:
@@ -242,48 +215,21 @@ def _recipe(slides: SlideDataset, recipe: Recipe, *, accepts_all: bool) -> Calla
         slides = SlideDataset(tuple(replace(x, signals={FAST_TOPIC: x.signals['signal_static']}) for x in slides))
     examples, features = training_examples(recipe, slides), slides.features(recipe.feature_set)
 
+    def end_of(result: SlideResult) -> tuple[Mapping[str, tuple[str, bool]], str]:
+        early = result.early()
+        estimates = {f'{s:g}': after for s in TIMES_S if (after := result.after(s)) is not None}
+        estimates |= {DECIDED: early} if early.decided and early.accepted else {}
+        estimates |= {END: result.end}
+        ends = {when: (one.label, accepts_all or one.accepted) for when, one in estimates.items()}
+        return ends, '' if ends[END][1] else result.end.rejection.name.lower()
+
     def fit(trained: Sequence[str]) -> Tested:
         model = train(recipe, examples.of_slides(trained))
-
-        def test(names: Sequence[str]) -> Mapping[str, Answer]:
-            results = predict_slides(model, features.of_slides(names))
-            return {name: _answer(one.surface, one, accepts_all) for name, one in results.items()}
-
-        return test
+        return lambda names: {
+            name: end_of(one) for name, one in predict_slides(model, features.of_slides(names)).items()
+        }
 
     return fit
-
-
-def _answer(surface: str, result: Any, accepts_all: bool) -> Answer:
-    """Return the answer of a recipe to a slide."""
-
-    def of(estimate: TextureEstimate) -> tuple[str, bool]:
-        return estimate.label, accepts_all or estimate.accepted
-
-    ends = {f'{s:g}': of(end) for s in TIMES_S if (end := result.after(s)) is not None}
-    early = result.early()
-    if early.decided and early.accepted:
-        ends[DECIDED] = of(early)
-    ends[END] = of(result.end)
-    return Answer('', surface, ends, '' if ends[END][1] else result.end.rejection.name.lower())
-
-
-def _peer(
-    slides: Mapping[str, LabelledSlide], windows: Mapping[str, Any], name: str, seed: int, trained: Sequence[str]
-) -> Tested:
-    fitted = peers.classifier(name, seed)
-    labels = np.concatenate([np.repeat(slides[one].surface, len(windows[one])) for one in trained])
-    fitted.fit(np.concatenate([windows[one] for one in trained]), labels)
-
-    def test(names: Sequence[str]) -> Mapping[str, Answer]:
-        found = {}
-        for one in names:
-            total = np.log(fitted.predict_proba(windows[one]) + 1e-9).sum(axis=0)
-            label = str(fitted.classes_[int(total.argmax())])
-            found[one] = Answer('', slides[one].surface, {END: (label, True)}, '')
-        return found
-
-    return test
 
 
 def _control(
@@ -292,13 +238,7 @@ def _control(
     """Return what a Gaussian for each texture answers by the conditions of slides alone."""
     gaussians = make_pipeline(StandardScaler(), QuadraticDiscriminantAnalysis(reg_param=0.01))
     gaussians.fit([of(slides[one]) for one in trained], [slides[one].surface for one in trained])
-
-    def test(names: Sequence[str]) -> Mapping[str, Answer]:
-        labels = gaussians.predict([of(slides[one]) for one in names])
-        ends = zip(names, labels, strict=True)
-        return {one: Answer('', slides[one].surface, {END: (str(label), True)}, '') for one, label in ends}
-
-    return test
+    return lambda names: {one: ({END: (str(gaussians.predict([of(slides[one])])[0]), True)}, '') for one in names}
 
 
 def _cluster(slide: LabelledSlide) -> str:
@@ -314,15 +254,10 @@ def names_of(slides: SlideDataset, numbers: str, *places: str) -> list[str]:
     return [x.name for x in slides.select(numbers, where=lambda one: not places or one.place in places)]
 
 
-def _cells_of(slides: SlideDataset) -> TrialSet:
-    cells = slides.in_parts(CELLS)
-    return TrialSet('cells of biotac20', cells, _cells(cells))
-
-
-def _cells(slides: SlideDataset) -> list[Trial]:
+def _cells(whole: SlideDataset) -> Trials:
     """Return a training in each cell of the track, and in some of them at once, for each draw of slides."""
+    slides, trials = whole.in_parts(CELLS), []
     places = [f'{number + 1}/{CELLS}' for number in range(CELLS)]
-    trials = []
     for draw, (trained, tested) in DRAWS.items():
         every = draw == FIRST_DRAW
         at = [names_of(slides, tested, place) for place in places]
@@ -338,10 +273,10 @@ def _cells(slides: SlideDataset) -> list[Trial]:
                 (SPACING, f'{name}: {THERE}'): [one for other in chosen for one in at[other]],
             }
             trials.append(Trial(draw, names_of(slides, trained, *(places[cell] for cell in chosen)), spaced, every))
-    return trials
+    return slides, trials
 
 
-def _stretches(spans: Mapping[str, Span], trained: Span, slides: SlideDataset) -> TrialSet:
+def _stretches(spans: Mapping[str, Span], trained: Span, slides: SlideDataset) -> Trials:
     """Return a training on one stretch of a track from either end, tested on others by their rows."""
     parts = slides.in_parts(PARTS)
     joined: dict[str, LabelledSlide] = {}
@@ -357,10 +292,10 @@ def _stretches(spans: Mapping[str, Span], trained: Span, slides: SlideDataset) -
                 (HALVES, row): names_of(both, after, _place(_turned(span, mirrored))) for row, span in spans.items()
             }
             trials.append(Trial(draw, there, tested, draw == FIRST_DRAW))
-    return TrialSet(f'biotac20, {", ".join(spans)}', both, trials)
+    return both, trials
 
 
-def _quarters(slides: SlideDataset) -> TrialSet:
+def _quarters(slides: SlideDataset) -> Trials:
     """Return trainings on three quarters of a track, tested on the fourth."""
     parts, places = slides.in_parts(4), [f'{number}/4' for number in range(1, 5)]
     trials = [
@@ -373,7 +308,7 @@ def _quarters(slides: SlideDataset) -> TrialSet:
         for draw, (before, after) in DRAWS.items()
         for place in places
     ]
-    return TrialSet('quarters of biotac20', parts, trials)
+    return parts, trials
 
 
 def _turned(span: Span, mirrored: bool) -> Span:
@@ -424,7 +359,7 @@ def _read_places(options: BenchmarkOptions) -> SlideDataset:
     )  # fmt: skip
 
 
-def _places(slides: SlideDataset) -> TrialSet:
+def _places(slides: SlideDataset) -> Trials:
     """Return six slides of one track, or of six places, trained and new places tested."""
     first = FIRST_OF_TRACK
     new = names_of(slides, f'{PLACES + 1}-{first}')
@@ -436,27 +371,26 @@ def _places(slides: SlideDataset) -> TrialSet:
         ),
         Trial('', names_of(slides, f'1-{PLACES}'), {(OTHER, 'simulated, new places from six'): new}),
     ]
-    return TrialSet('simulated places', slides, trials)
+    return slides, trials
 
 
 def _read_track(options: BenchmarkOptions) -> SlideDataset:
     """Simulate slides over the halves of a track."""
     scene, rng = load_scene(SCENE), np.random.default_rng([options.seed, 1])
-    n_surfaces = len(scene.surfaces)
-    starts_m = np.stack([np.repeat(list(ANCHOR.values()), ANCHORED)] * n_surfaces)
+    starts_m = np.stack([np.repeat(list(ANCHOR.values()), ANCHORED)] * len(scene.surfaces))
     starts_m = np.stack([starts_m, 0.0 * starts_m]) + ASTRAY_M * rng.standard_normal((2, *starts_m.shape))
     halves = slides_at(scene, starts_m, 0.0 * starts_m[0], rng)
     return SlideDataset(tuple(replace(x, place=list(ANCHOR)[(x.number - 1) // ANCHORED]) for x in halves))
 
 
-def _track(halves: SlideDataset) -> TrialSet:
-    tested = {(HALVES, row): names_of(halves, _last(number), row) for number, row in enumerate(ANCHOR)}
-    return TrialSet('simulated track', halves, [Trial('', names_of(halves, f'1-{ANCHORED * 2 // 3}'), tested)])
-
-
-def _last(half: int) -> str:
-    """Return the numbers of the last third of the slides of a half."""
-    return f'{half * ANCHORED + ANCHORED * 2 // 3 + 1}-{(half + 1) * ANCHORED}'
+def _track(halves: SlideDataset) -> Trials:
+    """Return the first two thirds of the slides of one half trained, and the last third of each half tested."""
+    first = ANCHORED * 2 // 3
+    tested = {
+        (HALVES, row): names_of(halves, f'{number * ANCHORED + first + 1}-{(number + 1) * ANCHORED}', row)
+        for number, row in enumerate(ANCHOR)
+    }
+    return halves, [Trial('', names_of(halves, f'1-{first}'), tested)]
 
 
 def slides_at(scene: Scene, places_m: Any, directions_rad: Any, rng: np.random.Generator) -> SlideDataset:
@@ -477,35 +411,17 @@ def slides_at(scene: Scene, places_m: Any, directions_rad: Any, rng: np.random.G
     )
 
 
-def _read_halves(options: BenchmarkOptions) -> SlideDataset:
-    return simulate(TRAINED, 9, np.random.default_rng(options.seed), conditions=True)
-
-
-def _simulated_halves(whole: SlideDataset) -> TrialSet:
-    """Return the halves of few simulated slides, for a reduced run."""
-    slides = whole.in_parts(2)
-    trained, there, here = (names_of(slides, *which) for which in (('1-6', '1/2'), ('7-9', '1/2'), ('7-9', '2/2')))
-    tested = {
-        (DISTANCE, '0'): there,
-        (DISTANCE, '1'): here,
-        (SPACING, f'1, 7: {BETWEEN}'): here,
-        (OTHER, 'simulated'): here,
-    }
-    return TrialSet('simulated halves', slides, [Trial('', trained, tested)])
-
-
 # --------------------
 # Other days, fingers, runs and speeds.
 
 
 def _read_fingersense(options: BenchmarkOptions) -> SlideDataset:
     """Read the dates from which on levels are alike: before, they are twenty times lower."""
-    with imported(options, 'fingersense') as bags:
-        slides = SlideDataset.from_bags(bags).select(labels=FABRICS, where=lambda one: one.session >= DATES[0])
-    return _middles(slides)
+    slides = recorded(options, 'fingersense')
+    return _middles(slides.select(labels=FABRICS, where=lambda one: one.session >= DATES[0]))
 
 
-def _dates(slides: SlideDataset) -> TrialSet:
+def _dates(slides: SlideDataset) -> Trials:
     """Return each date left out in turn."""
     trials = []
     for date in DATES:
@@ -513,7 +429,7 @@ def _dates(slides: SlideDataset) -> TrialSet:
         surfaces = {one.surface for one in trained}
         left = [one.name for one in slides if one.session == date and one.surface in surfaces]
         trials.append(Trial('', [one.name for one in trained], {(OTHER, 'fingersense, another date'): left}))
-    return TrialSet('dates of fingersense', slides, trials)
+    return slides, trials
 
 
 def _middles(dataset: SlideDataset) -> SlideDataset:
@@ -552,7 +468,7 @@ def _read_spider(options: BenchmarkOptions) -> SlideDataset:
     return _of_sessions(runs, 'signal_static', SPIDER_HZ, 'spider/cells')
 
 
-def _sessions(slides: SlideDataset) -> TrialSet:
+def _sessions(slides: SlideDataset) -> Trials:
     """Return one session of sandpapers trained, or two of a day, and other sessions tested."""
     rows: defaultdict[tuple[str, str], list[str]] = defaultdict(list)
     for one in slides:
@@ -561,7 +477,7 @@ def _sessions(slides: SlideDataset) -> TrialSet:
     trained = [one.name for one in slides if one.session == SPIDER_TRAINED]
     days = [one.name for one in slides if one.session in (SPIDER_TRAINED, '2024-02-13b')]
     two = {(OTHER, f'{row}, two sessions trained'): names for (_, row), names in rows.items() if 'same day' not in row}
-    return TrialSet('sessions of spider_sandpaper', slides, [Trial('', trained, rows), Trial('', days, two)])
+    return slides, [Trial('', trained, rows), Trial('', days, two)]
 
 
 def _read_borealtc(options: BenchmarkOptions) -> SlideDataset:
@@ -580,35 +496,33 @@ def _read_borealtc(options: BenchmarkOptions) -> SlideDataset:
     return _of_sessions(chunks, 'signal', BOREAL_HZ, 'borealtc/imu')
 
 
-def _runs(slides: SlideDataset) -> TrialSet:
+def _runs(slides: SlideDataset) -> Trials:
     """Return the first runs over each ground trained, and its later runs at other places tested."""
-    trained: list[str] = []
-    tested: list[str] = []
+    earlier: set[str] = set()
     for _, group in groupby(slides, key=lambda one: one.surface):
-        slides_of_material = list(group)
-        runs = list(dict.fromkeys(one.session for one in slides_of_material))
-        earlier = set(runs[: math.ceil(BOREAL_TRAINED * len(runs))])
-        for one in slides_of_material:
-            (trained if one.session in earlier else tested).append(one.name)
-    return TrialSet('runs of borealtc', slides, [Trial('', trained, {(OTHER, 'borealtc, other runs'): tested})])
+        runs = list(dict.fromkeys(one.session for one in group))
+        earlier |= set(runs[: math.ceil(BOREAL_TRAINED * len(runs))])
+    trained = [one.name for one in slides if one.session in earlier]
+    tested = [one.name for one in slides if one.session not in earlier]
+    return slides, [Trial('', trained, {(OTHER, 'borealtc, other runs'): tested})]
 
 
-def _strokes(slides: SlideDataset) -> TrialSet:
-    trial = Trial('', names_of(slides, '1-4'), {(OTHER, 'lmt29, other strokes by hand'): names_of(slides, '5-6')})
-    return TrialSet('strokes of lmt29', slides, [trial])
+def _strokes(slides: SlideDataset) -> Trials:
+    tested = {(OTHER, 'lmt29, other strokes by hand'): names_of(slides, '5-6')}
+    return slides, [Trial('', names_of(slides, '1-4'), tested)]
 
 
-def _speeds(slides: SlideDataset) -> TrialSet:
+def _speeds(slides: SlideDataset) -> Trials:
     """Return each speed left out in turn."""
     names, speeds = slides.names, slides.condition('speed')
     trials = [
         Trial('', names[speeds != speed].tolist(), {(OTHER, 'ntp21, another speed'): names[speeds == speed].tolist()})
         for speed in np.unique(speeds)
     ]
-    return TrialSet('speeds of ntp21', slides, trials)
+    return slides, trials
 
 
-def _other_half(slides: SlideDataset) -> TrialSet:
+def _other_half(slides: SlideDataset) -> Trials:
     """Return one half of the path trained, with one of four forces out; half a faster slide is shorter than windows."""
     halves = slides.select(where=lambda one: one.speed_m_s < 0.05).in_parts(2)
     names, forces, places = halves.names, halves.condition('force'), halves.condition('place')
@@ -618,64 +532,43 @@ def _other_half(slides: SlideDataset) -> TrialSet:
         for force in np.unique(forces)
         for place in ('1/2', '2/2')
     ]  # fmt: skip
-    return TrialSet('halves of ntp21', halves, trials)
-
-
-def _read_bags(name: str, options: BenchmarkOptions) -> SlideDataset:
-    with imported(options, name) as bags:
-        return SlideDataset.from_bags(bags)
-
-
-def _read_biotac20(options: BenchmarkOptions) -> SlideDataset:
-    """Read the materials in parallel processes: one after the other takes minutes."""
-    names = sorted(path.stem for path in options.recordings('biotac20').glob('material*.npz'))
-    return SlideDataset(tuple(one for slides in map_forked(partial(_read_material, options), names) for one in slides))
-
-
-def _read_material(options: BenchmarkOptions, name: str) -> tuple[LabelledSlide, ...]:
-    with imported(options, 'biotac20', materials=[name]) as bags:
-        return SlideDataset.from_bags(bags).slides
+    return halves, trials
 
 
 class Source(NamedTuple):
-    """A set of trials: the recordings that it is of, the recipes that are tried, and what makes the trials."""
+    """A data set: what reads it, and the recipes and the trials of each part of the study that is of it."""
 
-    data: str
-    recipes: Sequence[str]
-    make: Callable[[SlideDataset], TrialSet]
+    read: Callable[[BenchmarkOptions], SlideDataset]
+    parts: Mapping[str, tuple[Sequence[str], Callable[[SlideDataset], Trials]]]
 
 
-READERS: Readers = {
-    **{name: partial(_read_bags, name) for name in ('lmt29', 'ntp21')},
-    'biotac20': _read_biotac20,
-    'fingersense': _read_fingersense,
-    'spider_sandpaper': _read_spider,
-    'borealtc': _read_borealtc,
-    'simulated places': _read_places,
-    'simulated track': _read_track,
-    'simulated halves': _read_halves,
-}
+PLAIN = ('default', SVC)
 SETS: Mapping[str, Source] = {
-    'cells': Source('biotac20', (*PLACE_RECIPES, SVC, peers.CNN), _cells_of),
-    **{
-        ', '.join(spans): Source(
-            'biotac20',
-            (*PLACE_RECIPES, SVC, peers.CNN, *(CONTROLS if 'no gap' in spans else ())),
-            partial(_stretches, spans, trained),
-        )
-        for trained, spans in GAPS
-    },
-    'quarters': Source('biotac20', (*PLACE_RECIPES, SVC), _quarters),
-    'dates': Source('fingersense', TAXELS, _dates),
-    'sessions': Source('spider_sandpaper', TAXELS, _sessions),
-    'runs': Source('borealtc', ('default', SVC), _runs),
-    'strokes': Source('lmt29', ('default', SVC), _strokes),
-    'speeds': Source('ntp21', ('any-speed', SVC), _speeds),
-    'other half': Source('ntp21', ('any-speed', SVC), _other_half),
-    'simulated places': Source('simulated places', ('default', SVC), _places),
-    'simulated track': Source('simulated track', ('default', SVC), _track),
+    'biotac20': Source(
+        partial(recorded, name='biotac20'),
+        {
+            'cells': ((*PLACE_RECIPES, SVC), _cells),
+            **{
+                ', '.join(spans): (
+                    (*PLACE_RECIPES, SVC, *(CONTROLS if 'no gap' in spans else ())),
+                    partial(_stretches, spans, trained),
+                )
+                for trained, spans in GAPS
+            },
+            'quarters': ((*PLACE_RECIPES, SVC), _quarters),
+        },
+    ),
+    'fingersense': Source(_read_fingersense, {'dates': (TAXELS, _dates)}),
+    'spider_sandpaper': Source(_read_spider, {'sessions': (TAXELS, _sessions)}),
+    'borealtc': Source(_read_borealtc, {'runs': (PLAIN, _runs)}),
+    'lmt29': Source(partial(recorded, name='lmt29'), {'strokes': (PLAIN, _strokes)}),
+    'ntp21': Source(
+        partial(recorded, name='ntp21'),
+        {'speeds': (('any-speed', SVC), _speeds), 'other half': (('any-speed', SVC), _other_half)},
+    ),
+    'simulated places': Source(_read_places, {'simulated places': (PLAIN, _places)}),
+    QUICK_SET: Source(_read_track, {QUICK_SET: (PLAIN, _track)}),
 }
-REDUCED: Mapping[str, Source] = {'simulated halves': Source('simulated halves', ('default', SVC), _simulated_halves)}
 
 
 # --------------------
@@ -697,31 +590,11 @@ def figures(answers: Sequence[Answer]) -> dict[str, Any]:
         'slides': len(answers),
         'clusters': len(set(clusters)),
         **{name: float(which.mean()) for name, which in cases.items()},
-        'interval': {
-            name: interval(np.stack([which, np.ones(len(which))], axis=1), clusters) for name, which in cases.items()
-        },
+        'interval': {name: fraction_interval(which, clusters) for name, which in cases.items()},
         'accepted_wrong_at': {when: sum(which) / len(answers) for when, which in wrong.items()},
         'most_accepted_wrong': max(sum(which) / len(answers) for which in wrong.values()),
         'rejections': dict(Counter(one.reason for one in answers if one.reason).most_common()),
     }
-
-
-def result_of(
-    found: Mapping[str, Sequence[Figures]], missing: Sequence[str], options: BenchmarkOptions
-) -> BenchmarkResult:
-    """Return the figures of all cells, their chart, and the missing parts."""
-    numbers: dict[str, Any] = {table: {} for table in (DISTANCE, SPACING, HALVES, OTHER)}
-    for table, row, name, cell in (one for cells in found.values() for one in cells):
-        numbers[table].setdefault(row, {})[name] = cell
-    numbers['missing'] = list(missing)
-    return BenchmarkResult(
-        name='generalisation',
-        measured=run.__doc__,
-        data='simulated halves of slides' if options.quick else DATA_SETS,
-        split='one half of the track trained, the other tested' if options.quick else SPLIT,
-        numbers=numbers,
-        charts=(generalisation_chart(numbers, options.out / 'generalisation.png'),),
-    )
 
 
 DATA_SETS = (
@@ -743,7 +616,7 @@ SPLIT = (
 # --------------------
 # The chart.
 
-DRAWN = {'any-place-and-taxels': COLOURS[0], 'default': COLOURS[1], SVC: COLOURS[3], peers.CNN: COLOURS[5]}
+DRAWN = {'any-place-and-taxels': COLOURS[0], 'default': COLOURS[1], SVC: COLOURS[3]}
 LINES = {'accuracy': '-', 'accepted_correct': '--', 'accepted_wrong': ':'}
 WORDS = {'accuracy': 'accuracy', 'accepted_correct': 'accepted and correct', 'accepted_wrong': 'accepted but wrong'}
 
@@ -772,7 +645,7 @@ def _draw_distance(axes: Any, rows: Mapping[str, Mapping[str, Any]]) -> None:
             continue
         axes.plot([], [], color=colour, label=name)
         for what, dashes in LINES.items():
-            if what == 'accuracy' or name not in (SVC, peers.CNN):
+            if what == 'accuracy' or name != SVC:
                 axes.plot(at_cm, [100 * cell[what] for cell in cells], dashes, color=colour, marker='.')
     for what, dashes in LINES.items():
         axes.plot([], [], dashes, color='black', label=WORDS[what])

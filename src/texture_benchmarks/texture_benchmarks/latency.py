@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,17 +26,23 @@ from texture_estimation.roughness import (
 from texture_evaluation.evaluate import run_model
 from texture_evaluation.train import train_from_bags
 from texture_features.windows import CutWindow
-from texture_papers.rispal_experiment import FORCE_N, SPEED_M_S, USED_S, SimulatedTextures
+from texture_papers.rispal_experiment import FORCE_N, SPEED_M_S, SimulatedTextures
 from texture_recordings.dataset import SlideDataset
 from texture_simulation.offline import SlidePlan, write_simulated
 from texture_simulation.scene import load_scene
 
 RECIPES = ('default', 'vibration-and-taxels')
 CLASSES = 10
+SCENE, SURFACE = 'twelve_textures', 'leather'
 PASSES = 8  # over the test slides
-PLAN, QUICK_PLAN = SlidePlan(slides=20, slide_s=3.0), SlidePlan(slides=3, slide_s=1.5)
 LIVE_S, QUICK_LIVE_S = 40.0, 3.0
 TARGETS = {'in_process_median_us': 150.0, 'in_process_p99_us': 400.0, 'dds_p99_ms': 5.0, 'cpu_percent': 60.0}
+
+
+def _plan(options: BenchmarkOptions, force_n: float) -> SlidePlan:
+    """Return the slides over each surface that a model is trained on."""
+    slides, slide_s = (3, 1.5) if options.quick else (20, 3.0)
+    return SlidePlan(slides=slides, slide_s=slide_s, force_n=force_n)
 
 
 def run(options: BenchmarkOptions) -> BenchmarkResult:
@@ -47,49 +53,37 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     processes while 1 kHz in batches of 10 ms and 28 taxels at 60 Hz stream. CPU in percent of one core; the sensor
     node reads an emulated TSF-85.
     """
-    from texture_benchmarks.ros.graph import driver_cpu  # noqa: PLC0415  # ROS is needed for this alone
+    from texture_benchmarks.ros.graph import driver_cpu, measure  # noqa: PLC0415  # ROS is needed for this alone
 
-    plan = QUICK_PLAN if options.quick else PLAN
-    with tempfile.TemporaryDirectory() as folder:
-        surfaces = tuple(load_scene('twelve_textures').surfaces)[:CLASSES]
-        bags = write_simulated(Path(folder) / 'bags', plan, np.random.default_rng(options.seed), surfaces=surfaces)
-        timings = {recipe: _time(recipe, bags, plan.slides, Path(folder), options) for recipe in RECIPES}
+    plan, timings = _plan(options, 2.0), dict[str, Any]()
+    with tempfile.TemporaryDirectory() as name:
+        folder, surfaces = Path(name), tuple(load_scene(SCENE).surfaces)[:CLASSES]
+        bags = write_simulated(folder / 'bags', plan, np.random.default_rng(options.seed), SCENE, surfaces)
+        for recipe in RECIPES:
+            model = train_from_bags(recipe, bags, f'1-{plan.slides - 1}', folder / recipe)
+            dataset = SlideDataset.from_bags(bags, str(plan.slides))
+            cut = [events for _, events in dataset.windows(model.recipe.feature_set)]
+            # The last of each slide is its end, which is no window; the first pass warms up.
+            passes = [[run_model(model, events)[2][:-1] for events in cut] for _ in range(1 + PASSES)]
+            alone_us = np.concatenate([of_slide for timed in passes[1:] for of_slide in timed])
+            median, p99 = np.percentile(alone_us, (50, 99)).tolist()
+            live_s = QUICK_LIVE_S if options.quick else LIVE_S
+            live = measure(folder / f'{recipe}.npz', SCENE, SURFACE, live_s, seed=options.seed)
+            alone = {'windows': len(alone_us), 'median_us': median, 'p99_us': p99}
+            timings[recipe] = {'in_process': alone, 'dds': live, 'cpu_percent': live.pop('cpu_percent')}
     driver = round(100 * driver_cpu(), 1)
     for timing in timings.values():
-        cpu = {'sensor': driver, **timing['dds'].pop('cpu_percent')}
-        timing['cpu_percent'] = {**cpu, 'all': round(sum(cpu.values()), 1)}
+        cpu = timing['cpu_percent']
+        timing['cpu_percent'] = {'sensor': driver, **cpu, 'all': round(driver + cpu['all'], 1)}
     return BenchmarkResult(
-        name='latency',
-        measured=run.__doc__,
         data='simulated TSF-85, scene bench',
         split=f'trained on slides 1-{plan.slides - 1} of each surface; timed on slide {plan.slides}, live on a new one',
         numbers={'targets': TARGETS, **timings},
     )
 
 
-def _time(recipe: str, bags: list[Path], slides: int, folder: Path, options: BenchmarkOptions) -> dict[str, Any]:
-    """Return the figures of one recipe: in one process, and through the graph."""
-    from texture_benchmarks.ros.graph import LiveSlide, measure  # noqa: PLC0415
-
-    model = train_from_bags(recipe, bags, f'1-{slides - 1}', folder / recipe)
-    cut = [events for _, events in SlideDataset.from_bags(bags, str(slides)).windows(model.recipe.feature_set)]
-    # The last of each slide is its end, which is no window; the first pass warms up.
-    passes = [[run_model(model, events)[2][:-1] for events in cut] for _ in range(1 + PASSES)]
-    alone_us = np.concatenate([of_slide for timed in passes[1:] for of_slide in timed])
-    median, p99 = np.percentile(alone_us, (50, 99)).tolist()
-    slide = LiveSlide('twelve_textures', 'leather', QUICK_LIVE_S if options.quick else LIVE_S, options.seed)
-    [live] = measure(folder / f'{recipe}.npz', slide).values()
-    return {'in_process': {'windows': len(alone_us), 'median_us': median, 'p99_us': p99}, 'dds': live.numbers()}
-
-
-HAND_SCENE, HAND_CLASSES = 'kaboli', 10
-HAND_RECIPES, QUICK_RECIPES = ('default', 'vibration-and-taxels'), ('default',)
+HAND_SCENE = 'kaboli'
 FINGERS, QUICK_FINGERS = 5, 2
-HAND_PLAN, HAND_QUICK_PLAN = (
-    SlidePlan(slides=20, slide_s=3.0, force_n=0.5),
-    SlidePlan(slides=3, slide_s=1.5, force_n=0.5),
-)
-HAND_LIVE_S, HAND_QUICK_LIVE_S = 40.0, 3.0
 HAND_TARGETS = {'cpu_percent': 50.0, 'p99_ms': 10.0}
 
 
@@ -100,35 +94,23 @@ def run_hand(options: BenchmarkOptions) -> BenchmarkResult:
     slow channels at 100 Hz; windows of 0.5 s every 0.1 s. Latency from publishing the last sample of a window to
     receiving its estimate, ms; computing time of all extractors and classifiers, in percent of one core.
     """
-    plan = HAND_QUICK_PLAN if options.quick else HAND_PLAN
-    surfaces = tuple(load_scene(HAND_SCENE).surfaces)[:HAND_CLASSES]
-    with tempfile.TemporaryDirectory() as folder:
-        rng = np.random.default_rng(options.seed)
-        bags = write_simulated(Path(folder) / 'bags', plan, rng, HAND_SCENE, surfaces)
-        recipes = QUICK_RECIPES if options.quick else HAND_RECIPES
-        for recipe in recipes:
-            train_from_bags(recipe, bags, f'1-{plan.slides}', Path(folder) / recipe)
-        rows = {recipe: _live_hand(Path(folder) / f'{recipe}.npz', surfaces[0], options) for recipe in recipes}
+    from texture_benchmarks.ros.graph import measure  # noqa: PLC0415  # ROS is needed for this alone
+
+    plan, rows = _plan(options, 0.5), dict[str, Any]()
+    surfaces = tuple(load_scene(HAND_SCENE).surfaces)[:CLASSES]
+    fingers = [f'finger{number}' for number in range(QUICK_FINGERS if options.quick else FINGERS)]
+    with tempfile.TemporaryDirectory() as name:
+        folder, live_s = Path(name), QUICK_LIVE_S if options.quick else LIVE_S
+        bags = write_simulated(folder / 'bags', plan, np.random.default_rng(options.seed), HAND_SCENE, surfaces)
+        for recipe in RECIPES[: 1 if options.quick else None]:
+            train_from_bags(recipe, bags, f'1-{plan.slides}', folder / recipe)
+            model = folder / f'{recipe}.npz'
+            rows[recipe] = measure(model, HAND_SCENE, surfaces[0], live_s, seed=options.seed, fingers=fingers)
     return BenchmarkResult(
-        name='hand',
-        measured=run_hand.__doc__,
-        data=f'simulated BioTacs, scene {HAND_SCENE}, {HAND_CLASSES} objects; sensor nodes are not part of it',
+        data=f'simulated BioTacs, scene {HAND_SCENE}, {CLASSES} objects; sensor nodes are not part of it',
         split=f'trained on {plan.slides} slides of each object; timed on new slides',
         numbers={'targets': HAND_TARGETS, **rows},
     )
-
-
-def _live_hand(model: Path, surface: str, options: BenchmarkOptions) -> Mapping[str, Any]:
-    from texture_benchmarks.ros.graph import LiveLatency, LiveSlide, measure  # noqa: PLC0415  # ROS is needed for this
-
-    slide = LiveSlide(HAND_SCENE, surface, HAND_QUICK_LIVE_S if options.quick else HAND_LIVE_S, options.seed)
-    names = [f'finger{i}' for i in range(QUICK_FINGERS if options.quick else FINGERS)]
-    fingers = list(measure(model, slide, names).values())
-    cpu = {node: sum(finger.cpu[node] for finger in fingers) for node in sorted(fingers[0].cpu)}
-    latency_s = np.concatenate([finger.latency_s for finger in fingers])
-    all_of_them = LiveLatency(latency_s, sum(finger.expected for finger in fingers), cpu | {'all': sum(cpu.values())})
-    numbers: dict[str, Any] = all_of_them.numbers()
-    return numbers
 
 
 ROUGHNESS_RECIPES = {'ours': 'roughness', 'SVM5': 'ets-roughness-svm5', 'ANN5': 'ets-roughness-ann5'}
@@ -139,7 +121,11 @@ TARGET_US = 200.0
 
 
 def run_roughness(options: BenchmarkOptions) -> BenchmarkResult:
-    """Train on simulated scans, then time windows of textures never touched, one by one."""
+    """Train on simulated scans, then time windows of textures never touched, one by one, in one process.
+
+    Computing time of a core: features, checks, head and evidence for windows of 0.5 s at 1 kHz; the quickest of 5
+    rounds.
+    """
     grades = read_grades('ets_roughness')
     simulated = SimulatedTextures(load_scene('roughness'), options.seed)
     count = QUICK_SCANS if options.quick else SCANS
@@ -156,11 +142,6 @@ def run_roughness(options: BenchmarkOptions) -> BenchmarkResult:
     times = {name: min((taken[name] for taken in rounds), key=np.median) for name in models}
     percentiles = {name: np.percentile(values, (50, 99)).tolist() for name, values in times.items()}
     return BenchmarkResult(
-        name='roughness-latency',
-        measured=(
-            f'computing time of a core: features, checks, head and evidence for windows of {USED_S} s at 1 kHz, '
-            f'one by one, in one process; the quickest of {ROUNDS} rounds'
-        ),
         data='simulated TSF-85, scene roughness',
         split="by texture, the paper's: 15 for training, windows of the 10 others timed",
         numbers={

@@ -9,17 +9,16 @@ import math
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, imported
+from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, recorded
 from texture_core.config import find
-from texture_core.types import Array, SlideMotion, TextureEstimate, Window
-from texture_estimation.evidence import EvidenceAccumulator
+from texture_core.types import Array, SlideMotion, Window
 from texture_estimation.incremental import IncrementalClassifier
 from texture_estimation.learners.mlp import Mlp
 from texture_estimation.model import TextureModel
@@ -27,6 +26,8 @@ from texture_estimation.next_motion import NextTouchModel
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.training import train
 from texture_evaluation.charts import COLOURS, chart
+from texture_evaluation.cross_validation import predict_slides
+from texture_evaluation.metrics import window_accuracy
 from texture_evaluation.train import training_examples
 from texture_features.feature_set import FeatureSet, LabelledFeatures
 from texture_features.windows import CutWindow, WindowBatch
@@ -37,34 +38,8 @@ from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import load_scene
 from texture_simulation.sensor_models import SENSORS
 
-
-@dataclass(frozen=True)
-class Score:
-    """Accuracy of test windows and of whole test slides, 0 to 1.
-
-    `known` is the fraction of slides that are accepted, `certain_and_wrong` that of slides that could
-    have been stopped at their end with a wrong label.
-    """
-
-    windows: float
-    slides: float
-    known: float
-    certain_and_wrong: float
-
-
-@dataclass(frozen=True, eq=False)
-class IncrementalRun:
-    """Result of incremental training: scores by the number of slides of each new texture, and times.
-
-    `before` and `old` are the scores on the old textures alone: without the new ones, and after each stage.
-    """
-
-    incremental: dict[int, Score]
-    retrained: dict[int, Score]
-    new: dict[int, Score]
-    old: dict[int, Score]
-    before: Score
-    add_s: Array
+Scores = dict[str, dict[str, float]]  # accuracy of test windows and of whole test slides by model and test
+OLD, NEW_ONES = 'incremental, old textures', 'incremental, new textures'
 
 
 def run_incremental(
@@ -75,58 +50,40 @@ def run_incremental(
     last_training: int,
     stages: Sequence[int],
     path: Path,
-) -> IncrementalRun:
-    """Return the figures of a model of all labels but `new` to which these are added slide by slide."""
+) -> tuple[dict[int, Scores], dict[str, float], list[float]]:
+    """Train all labels but `new`, and add these slide by slide, in the folder of `path`.
+
+    Returns the scores by the number of slides of each new texture, those on the old textures alone before any slide
+    was added, and the processor time of adding each, s.
+    """
     numbers = np.array([int(group.rsplit('/', 1)[1].removeprefix('slide')) for group in examples.groups])
     is_new = np.isin(examples.labels, list(new))
     test, training = numbers > last_training, numbers <= last_training
     base = train(recipe, examples.take(training & ~is_new))
     base.save(path)
-    incremental_classifier, add_s = IncrementalClassifier(base, path), []
-    incremental_run = IncrementalRun({}, {}, {}, {}, _score(base, examples.take(test & ~is_new)), np.empty(0))
+    incremental, add_s, scores = IncrementalClassifier(base, path), list[float](), dict[int, Scores]()
     for stage, before in zip(stages, (0, *stages), strict=False):
-        for number in range(before + 1, stage + 1):
-            for label in new:
-                [slide] = set(examples.groups[(numbers == number) & (examples.labels == label)].tolist())
-                add_s.append(_add_examples(incremental_classifier, examples, slide))
+        for number, label in itertools.product(range(before + 1, stage + 1), new):
+            [slide] = set(examples.groups[(numbers == number) & (examples.labels == label)].tolist())
+            for vector in examples.vectors(slide)[:-1]:  # the last one is the end
+                incremental.observe(vector)
+            began_s = time.process_time()
+            incremental.add(label, slide)
+            add_s.append(time.process_time() - began_s)
         retrained = train(recipe, examples.take(training & (~is_new | (numbers <= stage))))
-        for scores, model, which in (
-            (incremental_run.incremental, incremental_classifier.model, test),
-            (incremental_run.retrained, retrained, test),
-            (incremental_run.new, incremental_classifier.model, test & is_new),
-            (incremental_run.old, incremental_classifier.model, test & ~is_new),
-        ):
-            scores[stage] = _score(model, examples.take(which))
-    return replace(incremental_run, add_s=np.array(add_s))
+        scores[stage] = {
+            'incremental': _score(incremental.model, examples.take(test)),
+            'retrained': _score(retrained, examples.take(test)),
+            NEW_ONES: _score(incremental.model, examples.take(test & is_new)),
+            OLD: _score(incremental.model, examples.take(test & ~is_new)),
+        }
+    return scores, _score(base, examples.take(test & ~is_new)), add_s
 
 
-def _add_examples(incremental_classifier: IncrementalClassifier, examples: LabelledFeatures, slide: str) -> float:
-    """Add one slide, and return the processor time that it took, s."""
-    for vector in examples.vectors(slide)[:-1]:  # the last one is the end
-        incremental_classifier.observe(vector)
-    began = time.process_time()
-    incremental_classifier.add(str(examples.labels[examples.groups == slide][0]), slide)
-    return time.process_time() - began
-
-
-def _score(model: TextureModel, examples: LabelledFeatures) -> Score:
-    log_probabilities = model.predict_log_proba(examples.values)
-    truth = np.array([model.labels.index(label) for label in examples.labels])
-    slides = [(str(slide), str(examples.labels[examples.groups == slide][0])) for slide in np.unique(examples.groups)]
-    finals = [(label, _final(model, examples, slide)) for slide, label in slides]
-    return Score(
-        windows=float((log_probabilities.argmax(axis=1) == truth).mean()),
-        slides=float(np.mean([final.label == label for label, final in finals])),
-        known=float(np.mean([final.accepted for _, final in finals])),
-        certain_and_wrong=float(np.mean([final.decided and final.label != label for label, final in finals])),
-    )
-
-
-def _final(model: TextureModel, examples: LabelledFeatures, slide: str) -> TextureEstimate:
-    """Return the final estimate of a slide, as the classifier reports it."""
-    evidence = EvidenceAccumulator(model)
-    *_, final = [evidence.update(vector) for vector in examples.vectors(slide)]
-    return final
+def _score(model: TextureModel, examples: LabelledFeatures) -> dict[str, float]:
+    results = list(predict_slides(model, examples).values())
+    slides = float(np.mean([one.end.label == one.surface for one in results]))
+    return {'windows': window_accuracy(results), 'slides': slides}
 
 
 # --------------------
@@ -205,11 +162,10 @@ def recorded_touches(slide: SlideSamples) -> Array:
     count = len(slide.samples) // length
     batch = WindowBatch(slide.samples[: count * length].reshape(count, length, -1), slide.rate_hz)
     [raw] = TOUCH_FEATURES.inputs
-    values: Array = np.concatenate([feature(batch) for _, feature in raw.features], axis=-1).mean(axis=1)
-    return values
+    return np.concatenate([feature(batch) for _, feature in raw.features], axis=-1).mean(axis=1)
 
 
-def chosen_motions(options: BenchmarkOptions, bags: Sequence[Path]) -> dict[str, dict[str, list[float]]]:
+def chosen_motions(options: BenchmarkOptions, dataset: SlideDataset) -> dict[str, dict[str, list[float]]]:
     """Return the accuracy after each slide, simulated and recorded, by the strategy that chooses motions."""
     found: dict[str, list[dict[str, Array]]] = {SIMULATED: [], RECORDED: []}
 
@@ -223,14 +179,15 @@ def chosen_motions(options: BenchmarkOptions, bags: Sequence[Path]) -> dict[str,
         found[SIMULATED].append(right_after_slides(known, motions, tested, rng, SLIDES))
 
     # Recorded: every other touch of each slide is trained, and the others are drawn for the test.
-    slides = SlideDataset.from_bags(bags[:4] if options.quick else bags).samples('signal')
+    names = list(dict.fromkeys(dataset.labels.tolist()))
+    slides = dataset.select(labels=names[: 4 if options.quick else None]).samples('signal')
     touches = {
         (SlideMotion('linear_slide', 0.0, round(one.speed_m_s, 3), round(one.force_n, 2), 0.0), one.surface): (
             recorded_touches(one)
         )
         for one in slides
     }
-    recorded, surfaces = list(dict.fromkeys(motion for motion, _ in touches)), sorted({name for _, name in touches})
+    kinds, surfaces = list(dict.fromkeys(motion for motion, _ in touches)), sorted({name for _, name in touches})
     for trained in (0, 1):
         rng = np.random.default_rng([options.seed, trained])
         tests = [(motion, name, values[trained::2]) for (motion, name), values in touches.items()]
@@ -244,9 +201,9 @@ def chosen_motions(options: BenchmarkOptions, bags: Sequence[Path]) -> dict[str,
             few = len(values) < TOUCHES  # only then a touch comes again within a trial
             return np.concatenate([values[rng.choice(len(values), TOUCHES, replace=few)] for _ in range(TRIALS)])
 
-        cells = [drawn(touches[cell][1 - trained :: 2]) for cell in itertools.product(recorded, surfaces)]
-        tested = np.stack(cells).reshape(len(recorded), len(surfaces), TRIALS * TOUCHES, -1)
-        found[RECORDED].append(right_after_slides(known, recorded, tested, rng, TOUCHES))
+        cells = [drawn(touches[cell][1 - trained :: 2]) for cell in itertools.product(kinds, surfaces)]
+        tested = np.stack(cells).reshape(len(kinds), len(surfaces), TRIALS * TOUCHES, -1)
+        found[RECORDED].append(right_after_slides(known, kinds, tested, rng, TOUCHES))
     return {
         source: {way: np.mean([one[way] for one in parts], axis=0).round(4).tolist() for way in parts[0]}
         for source, parts in found.items()
@@ -275,56 +232,42 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     if isinstance(recipe.learner, Mlp):
         recipe = replace(recipe, learner=replace(recipe.learner, folds=FOLDS))
     stages, last_training = (QUICK_STAGES, QUICK_TRAINED) if options.quick else (STAGES, TRAINED)
-    slides, materials = (QUICK_SLIDES, QUICK_MATERIALS) if options.quick else ('', ())
-    with imported(options, 'biotac20', slides, materials) as bags, tempfile.TemporaryDirectory() as folder:
-        examples = training_examples(recipe, SlideDataset.from_bags(bags, topics=recipe.feature_set.topics))
+    size, count = (1, 1) if options.quick else (NEW, DRAWS)
+    slides = recorded(options, 'biotac20', (QUICK_SLIDES, QUICK_MATERIALS), topics=recipe.feature_set.topics)
+    examples = training_examples(recipe, slides)
+    with tempfile.TemporaryDirectory() as folder:
         labels, rng = np.unique(examples.labels), np.random.default_rng(options.seed)
-        draws = [rng.permutation(labels)[: 1 if options.quick else NEW] for _ in range(1 if options.quick else DRAWS)]
+        draws = [rng.permutation(labels)[:size] for _ in range(count)]
+        given: Any = {'last_training': last_training, 'stages': stages}
         runs = [
-            run_incremental(
-                recipe,
-                examples,
-                draw.tolist(),
-                last_training=last_training,
-                stages=stages,
-                path=Path(folder) / f'draw{number}',
-            )
+            run_incremental(recipe, examples, draw.tolist(), **given, path=Path(folder) / f'draw{number}')
             for number, draw in enumerate(draws)
         ]
-    with imported(options, 'ntp21') as bags:
-        chosen = chosen_motions(options, bags)
+    chosen = chosen_motions(options, recorded(options, 'ntp21'))
     return BenchmarkResult(
-        name='learning',
-        measured=run.__doc__,
         data=f'BioTac vibration, {len(labels)} materials (github dexrob/BioTac_slide_20_50, Gao et al. 2020), recipe '
         f'{RECIPE} calibrated in {FOLDS} parts',
-        split=f'{len(runs)} draws of {len(draws[0])} new materials: trained on slides '
-        f'1-{last_training} of the others, '
-        f'trained slide by slide from slide 1 on, tested on the slides after {last_training} of all',
+        split=f'{count} draws of {size} new materials: trained on slides 1-{last_training} of the others, trained '
+        f'slide by slide from slide 1 on, tested on the slides after {last_training} of all',
         numbers={**_numbers(runs, draws, stages), 'chosen_motions': chosen},
-        charts=(_chart(runs, stages, len(draws[0]), options.out / 'learning.png'),),
+        charts=(_chart(runs, stages, size, options.out / 'learning.png'),),
     )
 
 
-def _numbers(runs: Sequence[IncrementalRun], draws: Sequence[Any], stages: Sequence[int]) -> Mapping[str, Any]:
-    add_ms = 1000 * np.concatenate([one.add_s for one in runs])
+def _numbers(runs: Sequence[tuple[Any, ...]], draws: Sequence[Any], stages: Sequence[int]) -> dict[str, Any]:
+    """Return the scores, mean over the runs, and the times of adding a slide."""
 
-    def mean(scores: Iterable[Score]) -> dict[str, float]:
-        rows = [asdict(score) for score in scores]
-        return {name: round(float(np.mean([row[name] for row in rows])), 4) for name in rows[0]}
+    def mean(scores: Sequence[Mapping[str, float]]) -> dict[str, float]:
+        return {name: round(float(np.mean([one[name] for one in scores])), 4) for name in scores[0]}
 
+    add_ms = 1000 * np.concatenate([add_s for *_, add_s in runs])
     return {
         'new': [sorted(draw.tolist()) for draw in draws],
         'slides': {
-            str(stage): {
-                'incremental': mean(one.incremental[stage] for one in runs),
-                'retrained': mean(one.retrained[stage] for one in runs),
-                'incremental, new textures': mean(one.new[stage] for one in runs),
-                'incremental, old textures': mean(one.old[stage] for one in runs),
-            }
+            str(stage): {which: mean([scores[stage][which] for scores, *_ in runs]) for which in runs[0][0][stage]}
             for stage in stages
         },
-        'old textures before any added slide': mean(one.before for one in runs),
+        'old textures before any added slide': mean([before for _, before, _ in runs]),
         'add_ms': {
             'added_slides': len(add_ms),
             'median': round(float(np.median(add_ms)), 1),
@@ -334,7 +277,7 @@ def _numbers(runs: Sequence[IncrementalRun], draws: Sequence[Any], stages: Seque
     }
 
 
-def _chart(runs: Sequence[IncrementalRun], stages: Sequence[int], new: int, path: Path) -> Path:
+def _chart(runs: Sequence[tuple[Any, ...]], stages: Sequence[int], new: int, path: Path) -> Path:
     """Draw slides and windows right over the number of slides of each new texture, mean and range over the draws."""
     lines = (('incremental', 'added one slide at a time', COLOURS[0]), ('retrained', 'trained again', COLOURS[1]))
     title = f'{new} new materials added to the others (BioTac, later slides of all)'
@@ -342,12 +285,11 @@ def _chart(runs: Sequence[IncrementalRun], stages: Sequence[int], new: int, path
         axes = figure.subplots()
         for what, dashes in (('slides', '-'), ('windows', '--')):
             for which, how, colour in lines:
-                right = 100 * np.array([[getattr(getattr(one, which)[s], what) for one in runs] for s in stages])
+                right = 100 * np.array([[scores[stage][which][what] for scores, *_ in runs] for stage in stages])
                 axes.plot(stages, right.mean(axis=1), dashes, marker='o', color=colour, label=f'{how}: {what}')
                 axes.fill_between(stages, right.min(axis=1), right.max(axis=1), color=colour, alpha=0.15, linewidth=0)
-        axes.set(
-            xscale='log', xlabel='slides of each new material', ylabel='right (%), range of draws', ylim=(None, 101)
-        )
+        axes.set(xscale='log', xlabel='slides of each new material', ylabel='right (%), range of draws')
+        axes.set_ylim(None, 101)
         axes.set_xticks(stages, [f'{stage}' for stage in stages])
         axes.minorticks_off()
         figure.legend(loc='outside lower center', ncols=2)  # the lines leave no corner free

@@ -17,7 +17,7 @@ import numpy as np
 from matplotlib.transforms import Bbox
 
 from texture_benchmarks import peers
-from texture_benchmarks.peers import CNN, MINIROCKET, QUANT, SVC, recipe_of, right_over_time, windows_of
+from texture_benchmarks.peers import MINIROCKET, QUANT, SVC, recipe_of, right_over_time, windows_of
 from texture_benchmarks.study import (
     DATA,
     QUICK_MATERIALS,
@@ -25,43 +25,49 @@ from texture_benchmarks.study import (
     BenchmarkOptions,
     BenchmarkResult,
     accuracy_interval,
-    imported,
     map_forked,
+    recorded,
     with_spaced_windows,
 )
 from texture_core.types import AnyArray, Array
 from texture_estimation.recipe import FAST_TOPIC
 from texture_evaluation import metrics
 from texture_evaluation.charts import COLOURS, chart, pareto_front
-from texture_evaluation.cross_validation import (
-    ChronologicalSplit,
-    Split,
-    cross_validate,
-    single_blas_thread,
-    split_slides,
-)
+from texture_evaluation.cross_validation import ChronologicalSplit, cross_validate, single_blas_thread, split_slides
 from texture_evaluation.evaluate import run_model
 from texture_papers.protocol import digest_of
 from texture_recordings.dataset import SlideDataset, cut_slide
 
 VIBRATION, ALL_CHANNELS = 'vibration', 'all channels'
 OURS, PAPERS, PEERS = 'this suite', 'recipes of papers', 'general classifiers'
-RECIPES: Mapping[str, Mapping[str, Sequence[str]]] = {
-    VIBRATION: {
-        PAPERS: ('hu-pca-svm', 'ets-fine-svm', 'ets-linear-svm', 'jamali-naive-bayes-5'),
-        OURS: ('default', 'any-place'),
-        PEERS: (SVC,),
-    },
-    ALL_CHANNELS: {
-        OURS: ('vibration-and-taxels', 'any-place-and-taxels'),
-        PAPERS: ('kaboli-svm', 'kaboli-pa'),
-    },
-}
+
+
+class _Job(NamedTuple):
+    channels: str
+    kind: str
+    name: str
+
+
+# What is tried, the longest first; the first recipe takes the most memory: it has a worker that nothing used before.
+# The features of 23 channels take QUANT gigabytes, and a tenth of a second each.
+JOBS = (
+    _Job(VIBRATION, PAPERS, 'hu-pca-svm'),
+    _Job(VIBRATION, PEERS, MINIROCKET),
+    _Job(VIBRATION, PEERS, QUANT),
+    _Job(ALL_CHANNELS, PEERS, MINIROCKET),
+    _Job(VIBRATION, PAPERS, 'ets-fine-svm'),
+    _Job(VIBRATION, PAPERS, 'ets-linear-svm'),
+    _Job(VIBRATION, PAPERS, 'jamali-naive-bayes-5'),
+    _Job(VIBRATION, OURS, 'default'),
+    _Job(VIBRATION, OURS, 'any-place'),
+    _Job(VIBRATION, PEERS, SVC),
+    _Job(ALL_CHANNELS, OURS, 'vibration-and-taxels'),
+    _Job(ALL_CHANNELS, OURS, 'any-place-and-taxels'),
+    _Job(ALL_CHANNELS, PAPERS, 'kaboli-svm'),
+    _Job(ALL_CHANNELS, PAPERS, 'kaboli-pa'),
+)
 QUICK_RECIPES = {'default', 'jamali-naive-bayes-5', 'kaboli-pa', 'vibration-and-taxels'}
 AUTHORS = {'ets': 'Roberge et al.', 'hu': 'Hu et al.', 'jamali': 'Jamali & Sammut', 'kaboli': 'Kaboli et al.'}
-FIRST = {False: 30 / 40, True: 4 / 6}  # fraction of the slides of each material that trains, by whether it is quick
-# The features of 23 channels take QUANT gigabytes, and a tenth of a second each.
-OF_ALL_CHANNELS = (MINIROCKET, CNN)
 PEERS_SHOWN = (SVC, MINIROCKET)  # over the sliding time: QUANT lies between them
 AT_S = 3.0  # the longest window of a paper is complete
 TIMED_SLIDES, LATENCY_ROUNDS = 40, 5  # the round with the lowest median counts, as other work only adds
@@ -70,12 +76,6 @@ SPLIT = 'by time: trained on slides 1-30 of each surface, tested on slides 31-40
 
 # --------------------
 # One run.
-
-
-class _Job(NamedTuple):
-    channels: str
-    kind: str
-    name: str
 
 
 # Results of a job: its figures, and a function that returns the time for each window, in µs.
@@ -92,12 +92,10 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     estimate (µs, median and 99th percentile), by the clock of the processor, of the round of 5 over all methods whose
     median was lowest.
     """
-    some = (QUICK_SLIDES, QUICK_MATERIALS) if options.quick else ()
-    with imported(options, 'biotac20', *some) as bags:
-        dataset = SlideDataset.from_bags(bags)
-    split = Split('by time', ChronologicalSplit(FIRST[options.quick]))
+    dataset = recorded(options, 'biotac20', (QUICK_SLIDES, QUICK_MATERIALS))
+    splitter = ChronologicalSplit(4 / 6 if options.quick else 30 / 40)  # of the slides of each material
     jobs = jobs_of(options.quick)
-    tried = dict(zip(jobs, map_forked(partial(_try, dataset, split, options.seed), jobs), strict=True))
+    tried = dict(zip(jobs, map_forked(partial(_try, dataset, splitter, options.seed), jobs), strict=True))
     with single_blas_thread():
         rounds = [{job: time_us() for job, (_, time_us) in tried.items()} for _ in range(LATENCY_ROUNDS)]
     numbers: dict[str, Any] = {VIBRATION: {}, ALL_CHANNELS: {}}
@@ -106,8 +104,6 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         latency_us = {'median': round(median, 1), 'p99': round(p99, 1)}
         numbers[job.channels][job.name] = {**figures, 'latency_us': latency_us}
     return BenchmarkResult(
-        name='overview',
-        measured=run.__doc__,
         data=DATA_SET,
         split=SPLIT,
         numbers=numbers,
@@ -119,40 +115,25 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
 
 
 def jobs_of(quick: bool) -> list[_Job]:
-    """Return what is tried, the longest first; peers only where their packages are."""
-    # The first recipe takes the most memory: it has a worker that nothing has used before.
-    there = not quick and peers.available()
-    by_channels = {VIBRATION: (MINIROCKET, QUANT, CNN), ALL_CHANNELS: OF_ALL_CHANNELS}
-    others = [_Job(channels, PEERS, name) for channels, names in by_channels.items() for name in names if there]
-    recipes = [
-        _Job(channels, kind, name)
-        for channels, kinds in RECIPES.items()
-        for kind, names in kinds.items()
-        for name in names
-        if not quick or name in QUICK_RECIPES
-    ]
-    return [*recipes[:1], *others, *recipes[1:]]
+    """Return what is tried: some recipes alone for a reduced run, and peers only where their package is."""
+    chosen = [job for job in JOBS if not quick or job.name in QUICK_RECIPES]
+    return [job for job in chosen if job.name not in peers.CLASSIFIERS or peers.available()]
 
 
-def _try(dataset: SlideDataset, split: Split, seed: int, job: _Job) -> _Tried:
-    return _try_peer(dataset, split, seed, job) if job.name in peers.CLASSIFIERS else _try_recipe(dataset, split, job)
-
-
-def _try_recipe(dataset: SlideDataset, split: Split, job: _Job) -> _Tried:
+def _try(dataset: SlideDataset, splitter: ChronologicalSplit, seed: int, job: _Job) -> _Tried:
+    if job.name in peers.CLASSIFIERS:
+        return _try_peer(dataset, splitter, seed, job)
     recipe = recipe_of(job.name)
     if job.kind != OURS:
         recipe = with_spaced_windows(recipe)
-    [fold] = (found := cross_validate(recipe, dataset, split.splitter)).folds
+    [fold] = (found := cross_validate(recipe, dataset, splitter)).folds
     results = found.pooled
-    times = sorted({round(e.evidence_s, 6) for result in results for e in result.decisions})
-    shortest = min(result.estimates[-1].evidence_s for result in results)
     right = {}
-    for seconds in times:
-        ends = [result.after(seconds) for result in results]
-        if seconds <= shortest + metrics.TOLERANCE_S and None not in ends:
-            right[seconds] = [
-                end is not None and end.label == one.surface for end, one in zip(ends, results, strict=True)
-            ]
+    for seconds in metrics.curve(results)[0].tolist():
+        ends = [(result.after(seconds), result.surface) for result in results]
+        labels = [end.label == surface for end, surface in ends if end is not None]
+        if len(labels) == len(ends):
+            right[seconds] = labels
     figures = {
         'kind': job.kind,
         **({} if job.kind == PEERS else {'definition': digest_of(job.name)}),
@@ -177,10 +158,10 @@ def _time_recipe(model: Any, cut: Sequence[Any]) -> Array:
     return np.concatenate(taken)
 
 
-def _try_peer(dataset: SlideDataset, split: Split, seed: int, job: _Job) -> _Tried:
+def _try_peer(dataset: SlideDataset, splitter: ChronologicalSplit, seed: int, job: _Job) -> _Tried:
     topics = (FAST_TOPIC,) if job.channels == VIBRATION else tuple(sorted(dataset[0].signals))
     windows = [windows_of(slide, topics) for slide in dataset]
-    [(trained, tested)] = split_slides(dataset, split.splitter, split.groups)
+    [(trained, tested)] = split_slides(dataset, splitter)
     start = time.process_time()
     classifier = peers.classifier(job.name, seed)
     labels = np.repeat(dataset.labels[trained], [len(windows[row]) for row in trained])

@@ -21,8 +21,8 @@ from texture_benchmarks.study import (
     QUICK_SLIDES,
     BenchmarkOptions,
     BenchmarkResult,
-    imported,
     map_forked,
+    recorded,
 )
 from texture_core.types import Array
 from texture_estimation.evidence import EvidenceAccumulator
@@ -33,7 +33,6 @@ from texture_estimation.training import train
 from texture_evaluation.charts import COLOURS, chart
 from texture_evaluation.cross_validation import single_blas_thread
 from texture_features.feature_set import LabelledFeatures
-from texture_recordings.dataset import SlideDataset
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,8 +89,7 @@ class FeatureSpread:
 def _root(deviations: Array) -> Array:
     """Return the symmetric square root of a covariance, from deviations (n, n_features)."""
     values, vectors = eigh(deviations.T @ deviations / max(1, len(deviations) - 1))
-    root: Array = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
-    return root
+    return (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
 
 
 RECIPE = 'default'
@@ -182,17 +180,14 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     """
     recipe = load_recipe(RECIPE)
     recipe = replace(recipe, augmentation=replace(recipe.augmentation, copies=0))
-    feature_set = replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
-    some = (QUICK_SLIDES, QUICK_MATERIALS) if options.quick else ()
-    with imported(options, 'biotac20', *some) as bags:
-        spread = FeatureSpread.of(SlideDataset.from_bags(bags, topics=feature_set.topics).features(feature_set))
+    feature_set = replace(recipe.feature_set, windows=recipe.training_windows)
+    slides = recorded(options, 'biotac20', (QUICK_SLIDES, QUICK_MATERIALS), topics=feature_set.topics)
+    spread = FeatureSpread.of(slides.features(feature_set))
     measure = partial(_measure, recipe, spread, options.seed)
     counts = QUICK_TEXTURES if options.quick else TEXTURES
     with single_blas_thread():
         rows = [map_forked(measure, [labels])[0] for labels in counts]  # each alone, for its memory
     return BenchmarkResult(
-        name='scale',
-        measured=run.__doc__,
         data='simulated at the level of features: centres of textures, slides and windows drawn from normal '
         f'distributions with the covariances of recorded ones; covariances from {DATA["biotac20"]}, all slides, '
         'windows 0.25 s apart; no augmented copies',

@@ -7,7 +7,7 @@ from __future__ import annotations
 import itertools
 import time
 import zlib
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -142,11 +142,6 @@ def _grown(contact: Contact, effect: Any, touch_protocol: TouchProtocol, sign: i
     return contact
 
 
-def with_one_more(scene: Scene) -> dict[str, Scene]:
-    """Return the scene with each of the effects that no scene names (`ADDED`)."""
-    return {name: replace(scene, effects={**scene.effects, name: EFFECTS[name]()}) for name in ADDED}
-
-
 BANDS = 24  # of the spectrum, each of equal width on a logarithmic scale
 LOWEST_HZ = 5.0
 MIN_POWER = 1e-12
@@ -154,38 +149,70 @@ CONFIDENCE = 0.95
 
 
 def ablate(
-    scene: Scene, touch_protocol: TouchProtocol, slides: int, repeats: int, seed: int, *, terms: Collection[str] = ()
+    scene: Scene, others: Mapping[str, Scene], touch_protocol: TouchProtocol, slides: int, *, repeats: int, seed: int
 ) -> dict[str, Any]:
-    """Return the accuracy on a scene, and how it changes without each of its terms, or of some, one at a time.
+    """Return the accuracy on a scene, and how it changes with each other scene, which lacks a term or has one more.
 
-    About this many slides are trained on, and as many tested; all is repeated with other random numbers. Of each term
-    'accuracy_without' is the change when neither training nor test has it, 'accuracy_trained_without' that when only
-    the test has it.
+    About this many slides are trained on, and as many tested; all is repeated with other random numbers. By term,
+    'accuracy_without' is the change when training and test have the other scene, 'accuracy_trained_without' that when
+    only the training has it.
     """
-    others = {term: other for term, other in variants(scene, touch_protocol).items() if not terms or term in terms}
-    rows = [_repeat(scene, others, touch_protocol, slides, [seed, number]) for number in range(repeats)]
-    changes = {
-        term: {
-            'accuracy_without': difference([of_term[term][0] for _, _, of_term in rows]),
-            'accuracy_trained_without': difference([of_term[term][1] for _, _, of_term in rows]),
-        }
-        for term in others
+    count = max(2, round(slides / len(scene.surfaces)))
+    pressed = replace(touch_protocol, forces_n=touch_protocol.tested_forces_n or touch_protocol.forces_n)
+
+    def learned(of: Scene, number: int) -> Any:
+        each = max(1, count // len(touch_protocol.training_by))
+        examples = simulate_features(of, touch_protocol, each, [seed, number, 0], touch_protocol.training_by)
+        learner = LinearDiscriminantAnalysis(solver='lsqr', shrinkage='auto')
+        return make_pipeline(StandardScaler(), learner).fit(*examples)
+
+    def tested(of: Scene, number: int) -> tuple[Array, NDArray[np.intp]]:
+        each = max(1, count // len(touch_protocol.tested_by))
+        return simulate_features(of, pressed, each, [seed, number, 2], touch_protocol.tested_by)
+
+    right: list[float] = []
+    changes: dict[str, tuple[list[float], list[float]]] = {term: ([], []) for term in others}
+    for number in range(repeats):
+        test = tested(scene, number)
+        right.append(float(learned(scene, number).score(*test)))
+        for term, other in others.items():
+            learner = learned(other, number)
+            changes[term][0].append(learner.score(*tested(other, number)) - right[-1])
+            changes[term][1].append(learner.score(*test) - right[-1])
+    return {
+        'accuracy': round(float(np.mean(right)), 4),
+        'tested': repeats * len(test[1]),
+        **{
+            term: {'accuracy_without': difference(both), 'accuracy_trained_without': difference(trained)}
+            for term, (both, trained) in changes.items()
+        },
     }
-    accuracy = round(float(np.mean([right for right, *_ in rows])), 4)
-    return {'accuracy': accuracy, 'tested': repeats * rows[0][1], **changes}
 
 
 def simulate_features(
     scene: Scene, touch_protocol: TouchProtocol, count: int, seed: Sequence[int], fingers: Sequence[int]
 ) -> tuple[Array, NDArray[np.intp]]:
     """Return features (n, n_features) and surfaces (n,) of `count` slides over each, by each finger in turn."""
-    values = [
-        np.concatenate(
-            [_extracted(scene, name, touch_protocol, count, ([*seed, finger], finger)) for finger in fingers]
-        )
-        for name in scene.surfaces
-    ]
-    return np.concatenate(values), np.repeat(np.arange(len(values)), [len(part) for part in values])
+    fast, *others = SENSORS[scene.sensor].streams
+    # Slides that meet all conditions in turn.
+    conditions = itertools.product(touch_protocol.speeds_m_s, touch_protocol.forces_n, touch_protocol.directions_rad)
+    rows = np.array(list(itertools.islice(itertools.cycle(conditions), count)))
+    values, codes = [], []
+    for (code, surface), finger in itertools.product(enumerate(scene.surfaces), fingers):
+        rng = np.random.default_rng([*seed, finger, zlib.crc32(surface.encode())])
+        parts = []
+        for turned_rad in touch_protocol.turned_rad:
+            sliding = SimulatedSlide(
+                rows[:, 0], rows[:, 1], touch_protocol.duration_s, rows[:, 2] + turned_rad, touch_protocol.radius_m
+            )
+            slow = touch_protocol.slow
+            measured = simulate_slide_streams(scene, surface, count, sliding, rng, finger=finger, slow=slow)
+            parts.append(extract_features(measured[fast.topic], fast.rate_hz))
+            for stream in others if slow else ():
+                parts += [measured[stream.topic].mean(axis=1), np.log10(measured[stream.topic].std(axis=1) + 1.0)]
+        values.append(np.concatenate(parts, axis=1))
+        codes += [code] * count
+    return np.concatenate(values), np.array(codes)
 
 
 def extract_features(samples: Samples, rate_hz: float) -> Array:
@@ -202,32 +229,6 @@ def extract_features(samples: Samples, rate_hz: float) -> Array:
     return np.asarray(np.log10(np.maximum(power, 0.0) + MIN_POWER).reshape(len(samples), -1), dtype=np.float64)
 
 
-def _repeat(
-    scene: Scene, others: Mapping[str, Scene], touch_protocol: TouchProtocol, slides: int, seed: list[int]
-) -> tuple[float, int, dict[str, tuple[float, float]]]:
-    """Return of one repetition the accuracy with all terms, the number tested, and the two differences by term."""
-    count = max(2, round(slides / len(scene.surfaces)))
-    pressed = replace(touch_protocol, forces_n=touch_protocol.tested_forces_n or touch_protocol.forces_n)
-
-    def learned(of: Scene) -> Any:
-        each = max(1, count // len(touch_protocol.training_by))
-        examples = simulate_features(of, touch_protocol, each, [*seed, 0], touch_protocol.training_by)
-        learner = LinearDiscriminantAnalysis(solver='lsqr', shrinkage='auto')
-        return make_pipeline(StandardScaler(), learner).fit(*examples)
-
-    def tested(of: Scene) -> tuple[Array, NDArray[np.intp]]:
-        each = max(1, count // len(touch_protocol.tested_by))
-        return simulate_features(of, pressed, each, [*seed, 2], touch_protocol.tested_by)
-
-    values, codes = tested(scene)
-    right = float(learned(scene).score(values, codes))
-    differences = {}
-    for term, other in others.items():
-        learner = learned(other)
-        differences[term] = learner.score(*tested(other)) - right, learner.score(values, codes) - right
-    return right, len(codes), differences
-
-
 def difference(values: Sequence[float] | Array) -> dict[str, float]:
     """Return the mean of differences, one of each repetition, and the half of its interval."""
     half = np.inf
@@ -235,34 +236,6 @@ def difference(values: Sequence[float] | Array) -> dict[str, float]:
         spread = float(np.std(values, ddof=1)) / np.sqrt(len(values))
         half = float(stats.t.ppf((1 + CONFIDENCE) / 2, len(values) - 1)) * spread
     return {'change': round(float(np.mean(values)), 4), 'half_interval': round(half, 4)}
-
-
-def _extracted(
-    scene: Scene, surface: str, touch_protocol: TouchProtocol, count: int, who: tuple[Sequence[int], int]
-) -> Array:
-    """Return the features of slides over one surface, (count, n_features), by a finger with a seed."""
-    seed, finger = who
-    rng = np.random.default_rng([*seed, zlib.crc32(surface.encode())])
-    fast, *others = SENSORS[scene.sensor].streams
-    parts = []
-    for turned_rad in touch_protocol.turned_rad:
-        sliding = _sliding(touch_protocol, count, turned_rad)
-        measured = simulate_slide_streams(scene, surface, count, sliding, rng, finger=finger, slow=touch_protocol.slow)
-        parts.append(extract_features(measured[fast.topic], fast.rate_hz))
-        for stream in others if touch_protocol.slow else ():
-            parts += [measured[stream.topic].mean(axis=1), np.log10(measured[stream.topic].std(axis=1) + 1.0)]
-    return np.concatenate(parts, axis=1)
-
-
-def _sliding(touch_protocol: TouchProtocol, count: int, turned_rad: float) -> SimulatedSlide:
-    """Return slides that meet all conditions in turn."""
-    conditions = list(
-        itertools.product(touch_protocol.speeds_m_s, touch_protocol.forces_n, touch_protocol.directions_rad)
-    )
-    rows = np.array([conditions[number % len(conditions)] for number in range(count)])
-    return SimulatedSlide(
-        rows[:, 0], rows[:, 1], touch_protocol.duration_s, rows[:, 2] + turned_rad, touch_protocol.radius_m
-    )
 
 
 SCAN_S = 0.5
@@ -369,24 +342,9 @@ def _draw_terms(axes: Any, terms: Mapping[str, Mapping[str, Mapping[str, float]]
 FEWER: Mapping[str, int] = {'sticky': 5, 'jamali': 3}
 
 
-@dataclass(frozen=True)
-class _Size:
-    """How much is measured."""
-
-    scenes: tuple[str, ...] = tuple(TOUCH_PROTOCOLS)
-    slides: int = 240
-    repeats: int = 5
-    paper_repeats: int = 3
-    scan_repeats: int = 15
-    many: int = 100  # slides at once
-
-    def ablation(self, scene: Scene, seed: int, terms: Sequence[str] = ()) -> dict[str, Any]:
-        """Return what terms of a scene contribute."""
-        slides = self.slides // FEWER.get(scene.name, 1)
-        return ablate(scene, TOUCH_PROTOCOLS[scene.name], slides, self.repeats, seed, terms=terms)
-
-
-QUICK = _Size(('ets_linear', 'sticky'), 32, 2, 1, 2, 10)
+# scenes, slides, repeats, those with the method of a paper, those of single slides, slides at once
+FULL = (tuple(TOUCH_PROTOCOLS), 240, 5, 3, 15, 100)
+QUICK = (('ets_linear', 'sticky'), 32, 2, 1, 2, 10)
 
 
 def run(options: BenchmarkOptions) -> BenchmarkResult:
@@ -397,35 +355,28 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     with and without each term; the effects that no scene names are put into one scene one at a time, as strong as the
     catalogue has them.
     """
-    size, costs = QUICK if options.quick else _Size(), {}
-    for name in size.scenes:
-        scene = load_scene(name)
+    names, slides, repeats, paper_repeats, scan_repeats, many = QUICK if options.quick else FULL
+    costs, terms = dict[str, Any](), dict[str, Any]()
+    for name in names:
+        scene, touch_protocol = load_scene(name), TOUCH_PROTOCOLS[name]
         sticks = {label: hasattr(surface.friction, 'BRISTLE_1_M') for label, surface in scene.surfaces.items()}
         for kind in sorted(set(sticks.values())):
             surfaces = [label for label in sticks if sticks[label] is kind]
-            costs[name, kind] = scan_cost(scene, surfaces, size.scan_repeats, size.many)
-    whole = {
-        name: size.ablation(completed(load_scene(name), TOUCH_PROTOCOLS[name]), options.seed) for name in size.scenes
-    }
-    added = {
-        name: {'strength': asdict(EFFECTS[name]()), **size.ablation(more, options.seed, (name,))}
-        for name, more in with_one_more(load_scene(HOST)).items()
-    }
-    numbers = {
-        'scan_ms': {f'{name}, stick-slip' if kind else name: cost for (name, kind), cost in costs.items()},
-        'terms': {
-            name: with_paper(scene, name, size.paper_repeats, 1000 + options.seed, quick=options.quick)
-            for name, scene in whole.items()
-        },
-        'added': added,
-    }
+            costs[f'{name}, stick-slip' if kind else name] = scan_cost(scene, surfaces, scan_repeats, many)
+        scene = completed(scene, touch_protocol)
+        fewer = slides // FEWER.get(name, 1)
+        row = ablate(scene, variants(scene, touch_protocol), touch_protocol, fewer, repeats=repeats, seed=options.seed)
+        terms[name] = with_paper(row, name, paper_repeats, 1000 + options.seed, quick=options.quick)
+    added = {}
+    for name in ADDED:
+        host, effect = load_scene(HOST), EFFECTS[name]()
+        more = replace(host, effects={**host.effects, name: effect})
+        row = ablate(more, {name: host}, TOUCH_PROTOCOLS[HOST], slides, repeats=repeats, seed=options.seed)
+        added[name] = {'strength': asdict(effect), **row}
     return BenchmarkResult(
-        name='scenes',
-        measured=run.__doc__,
         data='simulated scenes; slides of 2 and 3 s are cut to 1 s; terms that left a scene are put back for it',
-        split=f'{size.slides} slides for training (jamali a third, sticky a fifth), others for test, '
-        f"{size.repeats} repetitions; the papers' methods on {size.paper_repeats} sets of slides as many as in the "
-        f'paper; intervals of {CONFIDENCE:.0%}',
-        numbers=numbers,
-        charts=(ablation_chart(numbers, options.out / 'scenes_ablation.png'),),
+        split=f'{slides} slides for training (jamali a third, sticky a fifth), others for test, {repeats} repetitions; '
+        f"the papers' methods on {paper_repeats} sets of slides as many as in the paper; intervals of {CONFIDENCE:.0%}",
+        numbers={'scan_ms': costs, 'terms': terms, 'added': added},
+        charts=(ablation_chart({'terms': terms, 'added': added}, options.out / 'scenes_ablation.png'),),
     )

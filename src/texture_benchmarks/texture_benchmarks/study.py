@@ -11,9 +11,8 @@ import os
 import platform
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -22,9 +21,12 @@ import numpy as np
 from scipy.stats import binomtest
 
 from texture_core.errors import DeviceError, InvalidData
+from texture_core.types import AnyArray
 from texture_estimation.recipe import Recipe
 from texture_evaluation.cross_validation import interval, single_blas_thread
+from texture_recordings.dataset import SlideDataset
 from texture_recordings.public_sets import IMPORTS
+from texture_recordings.slides import STREAMS
 
 CPU_INFO = Path('/proc/cpuinfo')
 DATA = {
@@ -45,12 +47,16 @@ class BenchmarkOptions:
     data: Path | None = None
     seed: int = 0  # Of everything random
     quick: bool = False  # Fewer repetitions, for tests; such numbers are not for publishing
-    workers: int = 0  # Processes of a study that can be split into parts; 0: one for each core
-    budget_s: float = math.inf  # After this time such a study ends with the parts that it has
+    budget_s: float = math.inf  # After this time a study that has parts ends with those that it has
+    only: str = ''  # The one data set of `generalisation` that is measured; '' for all
+
+    def has(self, name: str) -> bool:
+        """Return whether there is a recorded data set of this name."""
+        return self.data is not None and (self.data / name).is_dir()
 
     def recordings(self, name: str) -> Path:
         """Return the folder of a recorded data set, by its name; InvalidData if it is missing."""
-        if self.data is None or not (self.data / name).is_dir():
+        if self.data is None or not self.has(name):
             missing = f"there is no '{name}' in '{self.data}'" if self.data else 'no folder of recorded data was given'
             raise InvalidData(f'{missing}; give the folder that holds {name}/ with --data')
         return self.data / name
@@ -58,28 +64,26 @@ class BenchmarkOptions:
 
 @dataclass(frozen=True)
 class BenchmarkResult:
-    """The numbers of one benchmark, and in one line each what was measured on what."""
+    """The numbers of one benchmark, and in one line each what they are of."""
 
-    name: str
-    measured: str | None  # mostly the docstring of what measured it
     data: str
     split: str
     numbers: Mapping[str, Any]
     charts: tuple[Path, ...] = field(default=())
 
-    def write(self, out: Path) -> Path:
-        """Write the JSON and return its path."""
+    def write(self, out: Path, name: str, measured: str | None) -> Path:
+        """Write the JSON and return its path; what was `measured` is the docstring of what measured it."""
         out.mkdir(parents=True, exist_ok=True)
         content = {
-            'name': self.name,
-            'measured': ' '.join((self.measured or '').split()),
+            'name': name,
+            'measured': ' '.join((measured or '').split()),
             'data': self.data,
             'split': self.split,
             'machine': machine(),
             'numbers': self.numbers,
             'charts': [chart.name for chart in self.charts],
         }
-        path = out / f'{self.name}.json'
+        path = out / f'{name}.json'
         path.write_text(json.dumps(content, indent=2, ensure_ascii=False) + '\n', encoding='utf-8')
         return path
 
@@ -95,74 +99,100 @@ def machine() -> str:
 Job = TypeVar('Job')
 Out = TypeVar('Out')
 
-_work: list[Callable[[Any], Any]] = []  # of a worker
+_work: list[Any] = []  # of a worker
 
 
 def map_forked(work: Callable[[Job], Out], jobs: Sequence[Job]) -> list[Out]:
     """Return work(job) for each job, in their order; one job alone has memory that nothing else has used."""
-    context = multiprocessing.get_context('fork')
-    with ProcessPoolExecutor(min(len(jobs), len(os.sched_getaffinity(0))), context, _begin, (work,)) as pool:
-        try:
-            return list(pool.map(_do, jobs))
-        except BrokenProcessPool as error:
-            sentence = 'a measurement ended without a result; see above, or give it more memory'
-            raise DeviceError(sentence) from error
+    found = {place: future.result() for place, future in _forked(work, jobs)}
+    return [found[place] for place in range(len(jobs))]
 
 
-def finished_forked(
-    work: Callable[[Job], Out], jobs: Sequence[Job], workers: int = 0, budget_s: float = math.inf
-) -> Iterator[tuple[Job, Out]]:
-    """Yield jobs with work(job) as they are finished; what fails is named, what lasts beyond the budget is ended."""
-    context = multiprocessing.get_context('fork')
-    count = min(len(jobs), workers or len(os.sched_getaffinity(0)))
-    if not count:
-        return
-    pool = ProcessPoolExecutor(count, context, _begin, (work,))
-    futures = {pool.submit(_do, job): job for job in jobs}
-    try:
-        for future in as_completed(futures, None if math.isinf(budget_s) else budget_s):
+def resumed(
+    work: Callable[[Job], Out], jobs: Mapping[str, Job], path: Path, options: BenchmarkOptions
+) -> dict[str, Out]:
+    """Return work(job) by the name of each part; those that an earlier run has written to the file come from there.
+
+    A part that fails is named, one that lasts beyond the budget is ended. The file goes when nothing is missing.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    lines = path.read_text(encoding='utf-8').splitlines() if path.is_file() else []
+    found = {line['part']: line['found'] for line in map(json.loads, lines)}
+    if found:
+        print(f"{len(found)} parts are of an earlier run, from '{path}'; remove it to compute all again", flush=True)
+    left = [name for name in jobs if name not in found]
+    with path.open('a', encoding='utf-8') as file:
+        for place, future in _forked(lambda name: work(jobs[name]), left, options.budget_s):
             if (error := future.exception()) is not None:
-                print(f'{futures[future]} failed: {type(error).__name__}: {error}', flush=True)
-            else:
-                yield futures[future], future.result()
+                print(f'{left[place]} failed: {type(error).__name__}: {error}', flush=True)
+                continue
+            found[left[place]] = future.result()
+            file.write(json.dumps({'part': left[place], 'found': future.result()}) + '\n')
+            file.flush()
+    if found.keys() == jobs.keys():
+        path.unlink()
+    return {name: found[name] for name in jobs if name in found}
+
+
+def _forked(
+    work: Callable[[Job], Out], jobs: Sequence[Job], budget_s: float = math.inf
+) -> Iterator[tuple[int, Future[Out]]]:
+    """Yield the places of jobs and what they came to, as they are finished; what lasts beyond the budget is ended."""
+    context = multiprocessing.get_context('fork')
+    count = min(len(jobs), len(os.sched_getaffinity(0)))
+    others = multiprocessing.active_children()
+    pool = ProcessPoolExecutor(max(count, 1), context, _begin, (work,))
+    places = {pool.submit(_do, job): place for place, job in enumerate(jobs)}
+    begun = [process for process in multiprocessing.active_children() if process not in others]
+    try:
+        for future in as_completed(places, None if math.isinf(budget_s) else budget_s):
+            if isinstance(future.exception(), BrokenProcessPool):
+                raise DeviceError('a measurement ended without a result; see above, or give it more memory')
+            yield places[future], future
     except TimeoutError:
         print(f'ended after {budget_s:g} s', flush=True)
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
-        for process in multiprocessing.active_children():
+        for process in begun:
             process.terminate()
 
 
 def _begin(work: Callable[[Any], Any]) -> None:
-    _work[:] = [work]
+    _work[:] = [work, single_blas_thread()]  # from here on: nothing leaves this block
 
 
 def _do(job: Any) -> Any:
-    with single_blas_thread():
-        return _work[0](job)
+    return _work[0](job)
+
+
+def fraction_interval(which: AnyArray | Sequence[bool], clusters: Sequence[str]) -> list[float]:
+    """Return the 95 % interval of a fraction, by bootstrap over clusters: slides of one are no independent draws."""
+    return interval(np.stack([which, np.ones(len(which))], axis=1), clusters)
 
 
 def accuracy_interval(right: Sequence[bool], surfaces: Sequence[str]) -> tuple[float, float]:
     """Return the 95 % interval of a fraction of slides: by bootstrap over surfaces, or exact over slides where wider.
 
-    Slides over one surface are no independent draws. Where all surfaces are alike, resampling them shows nothing.
-    Source of the exact one: Clopper & Pearson 1934.
+    Where all surfaces are alike, resampling them shows nothing. Source of the exact one: Clopper & Pearson 1934.
     """
-    drawn = interval(np.stack([right, np.ones(len(right))], axis=1), surfaces)
+    drawn = fraction_interval(right, surfaces)
     exact = binomtest(int(np.sum(right)), len(right)).proportion_ci()
     if all(right) or not any(right):
         return float(exact.low), float(exact.high)
     return float(min(drawn[0], exact.low)), float(max(drawn[1], exact.high))
 
 
-@contextmanager
-def imported(
-    options: BenchmarkOptions, name: str, slides: str = '', materials: Sequence[str] = ()
-) -> Iterator[list[Path]]:
-    """Give the bags of a data set, or of a part of it, to a `with` block."""
-    source = options.recordings(name)
+def recorded(
+    options: BenchmarkOptions,
+    name: str,
+    quick: tuple[str, Sequence[str]] = ('', ()),
+    topics: Sequence[str] = STREAMS,
+) -> SlideDataset:
+    """Return a recorded data set; of a reduced run the slides and materials of `quick`."""
     with tempfile.TemporaryDirectory() as folder:
-        yield IMPORTS[name](source, Path(folder), slides, materials)
+        some = quick if options.quick else ('', ())
+        bags = IMPORTS[name](options.recordings(name), Path(folder), *some)
+        return SlideDataset.from_bags(bags, topics=topics)
 
 
 def with_spaced_windows(recipe: Recipe) -> Recipe:

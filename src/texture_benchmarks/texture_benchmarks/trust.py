@@ -4,10 +4,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,16 +15,16 @@ import numpy as np
 from texture_benchmarks.peers import SVC, recipe_of
 from texture_benchmarks.study import (
     DATA,
+    QUICK_MATERIALS,
     BenchmarkOptions,
     BenchmarkResult,
     accuracy_interval,
-    imported,
+    recorded,
     with_spaced_windows,
 )
 from texture_core.types import Array, TactileSignal, join_batches
-from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.model import TextureModel
-from texture_estimation.recipe import Recipe, load_recipe
+from texture_estimation.recipe import load_recipe
 from texture_estimation.training import train
 from texture_evaluation import metrics
 from texture_evaluation.charts import COLOURS, chart
@@ -47,10 +46,6 @@ from texture_features.augmentation import (
 )
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.slides import LabelledSlide
-from texture_simulation.offline import simulate_slide_streams
-from texture_simulation.path import SimulatedSlide
-from texture_simulation.scene import load_scene
-from texture_simulation.sensor_models import SENSORS
 
 # --------------------
 # Disturbances, computed on the signals of whole slides.
@@ -81,6 +76,7 @@ class DisturbanceSweep:
     change: Disturbance
     strengths: Sequence[float]  # How strongly
     form: str  # Name of the disturbance at a strength
+    title: str  # What the axis of the chart shows
     percent: bool = False  # Whether the name gives the strength in percent
     nothing: float = 0.0  # Strength at which nothing changes; 1 for factors
     # Which strengths the classifier is trained on; None where it is trained on none
@@ -105,6 +101,7 @@ ROWS: Mapping[str, DisturbanceSweep] = {
         amplify,
         (0.5, 0.7, 0.8, 0.9, 1.1, 1.25, 1.4, 2.0),
         'gain × {:g}',
+        'gain, factor',
         nothing=1.0,
         trained=lambda augmentation: (1.0 / augmentation.gain_range, augmentation.gain_range),
     ),
@@ -112,6 +109,7 @@ ROWS: Mapping[str, DisturbanceSweep] = {
         add_noise,
         (0.003, 0.01, 0.03, 0.1),
         'white noise {:g} % of the rms',
+        'white noise, % of rms',
         percent=True,
         trained=lambda augmentation: (0.0, augmentation.noise_range),
     ),
@@ -119,14 +117,19 @@ ROWS: Mapping[str, DisturbanceSweep] = {
         at_other_speed,
         (0.4, 0.7, 0.9, 0.95, 1.05, 1.1, 1.4, 2.0),
         'speed × {:g}',
+        'speed, factor',
         nothing=1.0,
         trained=lambda augmentation: (1.0 - augmentation.speed_range, 1.0 + augmentation.speed_range),
     ),
-    'another finger': DisturbanceSweep(another_finger, (0.5, 1.0, 2.0, 4.0), 'another finger, {:g} dB'),
-    'wear': DisturbanceSweep(worn, (800.0, 500.0, 300.0), 'low-pass {:g} Hz', nothing=math.inf),
-    'offset drift': DisturbanceSweep(add_drift, (0.1, 1.0, 10.0), 'drift {:g} rms/s'),
-    'hidden losses': DisturbanceSweep(hold_lost, (0.003, 0.01, 0.03, 0.1), 'hidden losses {:g} %', percent=True),
-    'clipped': DisturbanceSweep(clip, (3.0, 2.0, 1.0), 'clipped at {:g} rms', nothing=math.inf),
+    'another finger': DisturbanceSweep(
+        another_finger, (0.5, 1.0, 2.0, 4.0), 'another finger, {:g} dB', 'another finger, dB'
+    ),
+    'wear': DisturbanceSweep(worn, (800.0, 500.0, 300.0), 'low-pass {:g} Hz', 'low-pass, Hz', nothing=math.inf),
+    'offset drift': DisturbanceSweep(add_drift, (0.1, 1.0, 10.0), 'drift {:g} rms/s', 'drift, rms/s'),
+    'hidden losses': DisturbanceSweep(
+        hold_lost, (0.003, 0.01, 0.03, 0.1), 'hidden losses {:g} %', 'hidden losses, %', percent=True
+    ),
+    'clipped': DisturbanceSweep(clip, (3.0, 2.0, 1.0), 'clipped at {:g} rms', 'clipped, at rms', nothing=math.inf),
 }
 
 
@@ -137,32 +140,10 @@ def disturbed(item: LabelledSlide, row: DisturbanceSweep, strength: float, rng: 
         whole = SlideWindows(
             run.samples[None].astype(np.float64), run.sampling_rate_hz, np.zeros(1), vibration=topic == VIBRATION
         )
-        return dataclasses.replace(run, samples=row.change(whole, strength, rng)[0].astype(np.float32))
+        return replace(run, samples=row.change(whole, strength, rng)[0].astype(np.float32))
 
     signals = {topic: [changed(topic, run) for run in join_batches(batches)] for topic, batches in item.signals.items()}
-    return dataclasses.replace(item, signals=signals)
-
-
-# --------------------
-# Simulated slides, for reduced runs without recordings.
-
-SCENE, TRAINED = 'twelve_textures', SimulatedSlide(0.1, 2.0, 3.0)  # speed, force and duration
-
-
-def simulate(sliding: SimulatedSlide, count: int, rng: np.random.Generator, *, conditions: bool) -> SlideDataset:
-    """Return `count` slides over each surface of the scene; whether they state speed and force is `conditions`."""
-    scene = load_scene(SCENE)
-    parts = {surface: simulate_slide_streams(scene, surface, count, sliding, rng) for surface in scene.surfaces}
-    streams = {stream.topic: stream for stream in SENSORS[scene.sensor].streams}
-    given: dict[str, Any] = {'speed_m_s': 0.1, 'force_n': 2.0, 'direction_rad': 0.0} if conditions else {}
-    return SlideDataset.from_arrays(
-        {topic: [samples for part in parts.values() for samples in part[topic]] for topic in streams},
-        [surface for surface in parts for _ in range(count)],
-        {topic: stream.rate_hz for topic, stream in streams.items()},
-        channels={topic: stream.channels for topic, stream in streams.items()},
-        motion='linear_slide',
-        **given,
-    )
+    return replace(item, signals=signals)
 
 
 # --------------------
@@ -171,81 +152,40 @@ def simulate(sliding: SimulatedSlide, count: int, rng: np.random.Generator, *, c
 OURS, PEER, PAPER = 'default', SVC, 'ets-fine-svm'  # of the papers, the one most often right here
 RECIPES = (OURS, 'vibration-and-taxels')
 COMPARED = (*RECIPES, PEER, PAPER)
-TRAINED_ON, TESTED_ON, DISTURBED = '1-30', '31-40', '32,35,38'
+TRAINED_ON, TESTED_ON, DISTURBED = SELECTED = '1-30', '31-40', '32,35,38'
 DISTURBED_DATA = f'{DATA["biotac20"]}; disturbances are computed on the recorded signals'
 LEFT_OUT, DRAWS, UNKNOWN_S = 5, 10, 2.5  # materials left out in each draw, and sliding after which they are counted
 SPLIT = (
     f'BioTac, trained on slides {TRAINED_ON}, tested on {TESTED_ON}; disturbed: {DISTURBED}; unknown: {DRAWS} draws of '
     f'{LEFT_OUT} materials that are not trained, slides of {UNKNOWN_S:g} s'
 )
-QUICK_COMPARED, QUICK_ROWS = ('default', PEER), ('gain', 'hidden losses')
+QUICK_COMPARED, QUICK_ROWS, QUICK_SELECTED = ('default', PEER), ('gain', 'hidden losses'), ('1-9', '10-15', '10-15')
 UNDISTURBED = 'undisturbed'
 MAX_ACCEPTED_WRONG = 2 / 60
 KEPT = 0.9  # of the labels that are right without a disturbance: below it, a recipe has broken down
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """How the slides of one cell ended."""
+def outcome(results: Sequence[SlideResult]) -> dict[str, Any]:
+    """Return how many slides had which label: at the first decided estimate, if accepted at the end, and at the end.
 
-    slides: int  # How many
-    # early_right, early_wrong: slides with a right and with a wrong label at the first decided estimate; the
-    # others were never decided
-    early_right: int
-    early_wrong: int
-    # final_right, final_wrong: slides with a right and with a wrong label that were accepted at the end;
-    # the others were rejected
-    final_right: int
-    final_wrong: int
-    label_right: int  # Slides with the right label at the end, whether they were accepted or not
-    interval: tuple[float, float]  # Of their fraction, 95 %, over surfaces: slides over one are no independent draws
-
-    @property
-    def worst_wrong(self) -> float:
-        """The larger fraction of slides that were accepted but wrong: at the first decided estimate, or at the end."""
-        return max(self.early_wrong, self.final_wrong) / self.slides
-
-    @classmethod
-    def of(cls, results: Sequence[SlideResult]) -> Outcome:
-        """Return the outcome of slides; one without a window counts as rejected."""
-        measured = [result for result in results if result.estimates]
-        first = [(next((e for e in result.estimates if e.decided), None), result) for result in measured]
-        early = [estimate.label == result.surface for estimate, result in first if estimate is not None]
-        final = [result.end.label == result.surface for result in measured if result.end.accepted]
-        labels = [bool(result.estimates) and result.end.label == result.surface for result in results]
-        return cls(
-            slides=len(results),
-            early_right=sum(early),
-            early_wrong=len(early) - sum(early),
-            final_right=sum(final),
-            final_wrong=len(final) - sum(final),
-            label_right=sum(labels),
-            interval=accuracy_interval(labels, [result.surface for result in results]),
-        )
+    The others were never decided, and rejected at the end.
+    """
+    first = [(next((e for e in one.estimates if e.decided), None), one.surface) for one in results]
+    early = [estimate.label == surface for estimate, surface in first if estimate is not None]
+    final = [one.end.label == one.surface for one in results if one.end.accepted]
+    labels = [one.end.label == one.surface for one in results]
+    return {
+        'slides': len(results),
+        'early_right': sum(early),
+        'early_wrong': len(early) - sum(early),
+        'final_right': sum(final),
+        'final_wrong': len(final) - sum(final),
+        'label_right': sum(labels),
+        'interval': accuracy_interval(labels, [one.surface for one in results]),
+    }
 
 
-Outcomes = dict[str, dict[str, Outcome]]  # by recipe and row
-
-
-def evaluate_slides(model: TextureModel, slides: Sequence[LabelledSlide]) -> list[SlideResult]:
-    """Return the estimates of a model for slides, window by window."""
-    results = []
-    for slide, vectors in SlideDataset(tuple(slides)).vectors(model.recipe.feature_set):
-        evidence = EvidenceAccumulator(model)
-        estimates = [evidence.update(vector) for vector in vectors]
-        alone = model.decide(np.stack([vector.values for vector in vectors])) if vectors else []
-        results.append(SlideResult(slide.surface, alone, [estimate for estimate in estimates if estimate.windows]))
-    return results
-
-
-def _slides(options: BenchmarkOptions) -> tuple[SlideDataset, SlideDataset, SlideDataset]:
-    """Return the slides that are trained, tested, and disturbed: recorded, or for a quick run simulated ones."""
-    if options.quick:
-        slides = simulate(TRAINED, 9, np.random.default_rng(options.seed), conditions=True)
-        return slides.select('1-6'), slides.select('7-9'), slides.select('7-9')
-    with imported(options, 'biotac20') as bags:
-        slides = SlideDataset.from_bags(bags)
-    return slides.select(TRAINED_ON), slides.select(TESTED_ON), slides.select(DISTURBED)
+Outcomes = dict[str, dict[str, dict[str, Any]]]  # by recipe and row
 
 
 def run(options: BenchmarkOptions) -> BenchmarkResult:
@@ -257,10 +197,25 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     all the same. The estimates have no information of the disturbance. 95 % intervals by
     bootstrap over surfaces, or exact over slides where these are wider.
     """
-    trained, tested, to_disturb = _slides(options)
-    models = {name: _trained(name, trained) for name in (QUICK_COMPARED if options.quick else COMPARED)}
-    clean = {name: evaluate_slides(model, tested.slides) for name, model in models.items()}
-    outcomes = _under_disturbances(models, clean, to_disturb, options)
+    rows, compared = (QUICK_ROWS, QUICK_COMPARED) if options.quick else (tuple(ROWS), COMPARED)
+    slides = recorded(options, 'biotac20', ('1-15', QUICK_MATERIALS))
+    trained, tested, to_disturb = map(slides.select, QUICK_SELECTED if options.quick else SELECTED)
+    # Train, and test without a disturbance, with each, and over unknown materials.
+    models = {}
+    for name in compared:
+        recipe = with_spaced_windows(recipe_of(name)) if name in (PEER, PAPER) else recipe_of(name)
+        models[name] = train(recipe, training_examples(recipe, trained))
+    clean = {name: _results(model, tested) for name, model in models.items()}
+    outcomes: Outcomes = {name: {UNDISTURBED: outcome(results)} for name, results in clean.items()}
+    for number, kind in enumerate(rows):
+        for column, strength in enumerate(ROWS[kind].strengths):
+            seeds = np.random.SeedSequence([options.seed, number, column]).spawn(len(to_disturb))
+            changed = [
+                disturbed(item, ROWS[kind], strength, np.random.default_rng(seed))
+                for item, seed in zip(to_disturb, seeds, strict=True)
+            ]
+            for name, model in models.items():
+                outcomes[name][ROWS[kind].name(strength)] = outcome(_results(model, SlideDataset(tuple(changed))))
     numbers: dict[str, Any] = {
         name: {
             'window_accuracy': metrics.window_accuracy(clean[name]),
@@ -268,58 +223,28 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
             'accepted_wrong': metrics.accepted_wrong(clean[name]),
             'rejected': metrics.rejected(clean[name]),
             'early': metrics.early_decision(clean[name]),
-            'above_allowed': [row for row, one in outcomes[name].items() if one.worst_wrong > MAX_ACCEPTED_WRONG],
-            'outcomes': {row: asdict(outcome) for row, outcome in outcomes[name].items()},
-            'breakdown': {row: breakdown_strengths(ROWS[row], outcomes[name]) for row in _rows(options)},
+            'above_allowed': [
+                row
+                for row, one in outcomes[name].items()
+                if max(one['early_wrong'], one['final_wrong']) > MAX_ACCEPTED_WRONG * one['slides']
+            ],
+            'outcomes': outcomes[name],
+            'breakdown': {row: breakdown_strengths(ROWS[row], outcomes[name]) for row in rows},
         }
         for name in models
     }
     if not options.quick:
         numbers['unknown_materials'] = _unknown_materials(options, trained, tested)
-    chart_path = options.out / 'failures.png'
-    charts = () if options.quick else (failures_chart(numbers, chart_path),)
     return BenchmarkResult(
-        name='trust',
-        measured=run.__doc__,
-        data=f'simulated scene {SCENE}' if options.quick else DISTURBED_DATA,
+        data=DISTURBED_DATA,
         split=SPLIT,
         numbers=numbers,
-        charts=charts,
+        charts=() if options.quick else (failures_chart(numbers, options.out / 'failures.png'),),
     )
 
 
-def _rows(options: BenchmarkOptions) -> Sequence[str]:
-    return QUICK_ROWS if options.quick else tuple(ROWS)
-
-
-def _trained(name: str, slides: SlideDataset) -> TextureModel:
-    recipe = _recipe(name)
-    return train(recipe, training_examples(recipe, slides))
-
-
-def _recipe(name: str) -> Recipe:
-    return with_spaced_windows(recipe_of(name)) if name in (PEER, PAPER) else recipe_of(name)
-
-
-def _under_disturbances(
-    models: Mapping[str, TextureModel],
-    clean: Mapping[str, Sequence[SlideResult]],
-    to_disturb: SlideDataset,
-    options: BenchmarkOptions,
-) -> Outcomes:
-    """Return the outcomes of undisturbed slides, and of the slides under each disturbance."""
-    outcomes: Outcomes = {name: {UNDISTURBED: Outcome.of(results)} for name, results in clean.items()}
-    for row, kind in enumerate(_rows(options)):
-        row_kind = ROWS[kind]
-        for column, strength in enumerate(row_kind.strengths):
-            seeds = np.random.SeedSequence([options.seed, row, column]).spawn(len(to_disturb))
-            slides = [
-                disturbed(item, row_kind, strength, np.random.default_rng(seed))
-                for item, seed in zip(to_disturb, seeds, strict=True)
-            ]
-            for name, model in models.items():
-                outcomes[name][row_kind.name(strength)] = Outcome.of(evaluate_slides(model, slides))
-    return outcomes
+def _results(model: TextureModel, slides: SlideDataset) -> list[SlideResult]:
+    return list(predict_slides(model, slides.features(model.recipe.feature_set)).values())
 
 
 def _unknown_materials(options: BenchmarkOptions, trained: SlideDataset, tested: SlideDataset) -> dict[str, Any]:
@@ -362,17 +287,17 @@ def breakdown(places: Sequence[float], accuracies: Sequence[float]) -> float | N
     return float(places[below - 1] + fallen * (places[below] - places[below - 1]))
 
 
-def breakdowns(sweep: DisturbanceSweep, outcomes: Mapping[str, Outcome]) -> list[float]:
+def breakdowns(sweep: DisturbanceSweep, outcomes: Mapping[str, Mapping[str, Any]]) -> list[float]:
     """Return the places on the axis of a sweep, 0 for its first strength, where the accuracy breaks down."""
     rows = ordered(sweep)
-    accuracies = [outcomes[name].label_right / outcomes[name].slides for _, name in rows]
+    accuracies = [outcomes[name]['label_right'] / outcomes[name]['slides'] for _, name in rows]
     clean = [name for _, name in rows].index(UNDISTURBED)
     sides = (list(range(clean, -1, -1)), list(range(clean, len(rows))))
     found = [breakdown(side, [accuracies[place] for place in side]) for side in sides]
     return [place for place in found if place is not None]
 
 
-def breakdown_strengths(sweep: DisturbanceSweep, outcomes: Mapping[str, Outcome]) -> list[float]:
+def breakdown_strengths(sweep: DisturbanceSweep, outcomes: Mapping[str, Mapping[str, Any]]) -> list[float]:
     """Return the strengths at these places; below an infinite one, the first that was measured."""
     strengths = [strength for strength, _ in ordered(sweep)]
     found = []
@@ -386,16 +311,6 @@ def breakdown_strengths(sweep: DisturbanceSweep, outcomes: Mapping[str, Outcome]
 # The chart.
 
 RIGHT, UNKNOWN, WRONG = COLOURS[2], '#d9d9d9', COLOURS[5]
-DRAWN: Mapping[str, str] = {
-    'gain': 'gain, factor',
-    'white noise': 'white noise, % of rms',
-    'speed': 'speed, factor',
-    'another finger': 'another finger, dB',
-    'wear': 'low-pass, Hz',
-    'offset drift': 'drift, rms/s',
-    'hidden losses': 'hidden losses, %',
-    'clipped': 'clipped, at rms',
-}
 LINES: Mapping[str, tuple[str, str, str]] = {
     OURS: (f'this suite: {OURS}', COLOURS[0], 'o'),
     PEER: (f'peer: {PEER}', COLOURS[3], 's'),
@@ -409,9 +324,9 @@ def failures_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
         heights = [1.0, 0.5] * 3
         grid = figure.subplots(6, 3, height_ratios=heights, sharey='row')
         panels = [(grid[2 * place, column], grid[2 * place + 1, column]) for place in range(3) for column in range(3)]
-        for (lines, strip), (row, title) in zip(panels, DRAWN.items(), strict=False):
-            _draw_sweep(lines, strip, ROWS[row], numbers)
-            lines.set_title(title)
+        for (lines, strip), sweep in zip(panels, ROWS.values(), strict=False):
+            _draw_sweep(lines, strip, sweep, numbers)
+            lines.set_title(sweep.title)
         _draw_unknown(*panels[-1], numbers['unknown_materials'])
         for lines, strip in zip(grid[::2, 0], grid[1::2, 0], strict=True):
             lines.set_ylabel('label right (%)')
@@ -437,8 +352,7 @@ def _draw_sweep(lines: Any, strip: Any, sweep: DisturbanceSweep, numbers: Mappin
         low, high = 100 * np.array([end['interval'] for end in ends]).T
         lines.fill_between(places, low, high, color=colour, alpha=0.13, linewidth=0)
         lines.plot(places, accuracy, color=colour, marker=marker, markersize=4, label=label)
-    ours = {row: Outcome(**numbers[OURS]['outcomes'][row]) for _, row in rows}
-    for place in breakdowns(sweep, ours):
+    for place in breakdowns(sweep, numbers[OURS]['outcomes']):
         lines.axvline(place, color=COLOURS[0], linestyle=':')
     lines.plot([], [], color=COLOURS[0], linestyle=':', label=f'{OURS} breaks down: 90 % of undisturbed')
     lines.set(ylim=(0, 105), xticks=places, xlim=(-0.5, len(rows) - 0.5))

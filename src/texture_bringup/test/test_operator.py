@@ -6,7 +6,7 @@ import time
 from contextlib import ExitStack, contextmanager
 
 import pytest
-from rclpy.action import ActionServer
+from rclpy.action import ActionServer, CancelResponse
 from rclpy.context import Context
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
@@ -22,8 +22,8 @@ DOMAIN = 62
 
 
 @contextmanager
-def silent_explorer(taken=None):
-    """An explorer that takes a goal, sets `taken` and never answers."""
+def silent_explorer(taken=None, goals=None, begin=None):
+    """An explorer that takes a goal once `begin` is set, sets `taken`, and never answers; `goals` are those taken."""
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     context, over, left = Context(), threading.Event(), threading.Event()
     taken = taken or threading.Event()
@@ -32,15 +32,16 @@ def silent_explorer(taken=None):
 
     def hang(goal):
         taken.set()
+        (goals if goals is not None else []).append(goal)
         over.wait(60.0)
         goal.abort()
         executor.create_task(left.set)  # after what this answer asks of the executor
         return action.Explore.Result()
 
-    server = ActionServer(node, action.Explore, 'explore', hang)
+    server = ActionServer(node, action.Explore, 'explore', hang, cancel_callback=lambda _goal: CancelResponse.ACCEPT)
     executor = MultiThreadedExecutor(2, context=context)
     executor.add_node(node)
-    thread = threading.Thread(target=executor.spin)
+    thread = threading.Thread(target=lambda: (begin is None or begin.wait(60.0), executor.spin()))
     thread.start()
     try:
         yield
@@ -99,3 +100,26 @@ def test_ctrl_c_says_that_the_robot_must_be_looked_at_when_the_explorer_does_not
         sent.append(True)
         with pytest.raises(KeyboardInterrupt, match=r'has not confirmed within 0\.5 s that the finger was lifted'):
             operator.explore(ExplorationRequest('linear_slide'))
+
+
+@pytest.mark.parametrize('end', ['no answer', 'Ctrl-C'])
+def test_a_request_that_is_accepted_after_its_client_gave_up_is_cancelled_at_once(monkeypatch, end):
+    monkeypatch.setattr(operators, 'ACCEPT_S', 0.5)
+    monkeypatch.setattr(operators, 'CANCEL_DEADLINE_S', 0.5)
+    begin, goals, sent = threading.Event(), [], []
+
+    def press_ctrl_c():
+        if sent and end == 'Ctrl-C':
+            raise KeyboardInterrupt
+
+    with silent_explorer(goals=goals, begin=begin):
+        with operators.Operator(domain_id=DOMAIN, guard=press_ctrl_c) as operator:
+            operator.wait_for_explorer(30.0)
+            sent.append(True)
+            with pytest.raises((MotionAborted, KeyboardInterrupt)):
+                operator.explore(ExplorationRequest('linear_slide'))
+        begin.set()
+        deadline_s = time.monotonic() + 10.0
+        while not (goals and goals[0].is_cancel_requested):
+            assert time.monotonic() < deadline_s
+            time.sleep(0.01)

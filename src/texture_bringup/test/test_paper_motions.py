@@ -94,7 +94,7 @@ def features_of(name):
 @pytest.mark.parametrize(('step_ns', 'late_ns'), ARMS.values(), ids=ARMS)
 @pytest.mark.parametrize('name', PAIRS)
 def test_every_motion_of_a_preset_gives_the_recipes_of_its_paper_a_window(name, step_ns, late_ns):
-    for request in load_preset(name).requests:
+    for request in load_preset(name, 1):
         states = states_of(request, step_ns, late_ns)
         for recipe in PAIRS[name]:
             assert windows_of(states, features_of(recipe), 1000.0), f'{recipe} has no window of {request}'

@@ -94,7 +94,7 @@ class Rig:
     @property
     def request(self) -> ExplorationRequest:
         """The first motion of the preset."""
-        return load_preset(self.paper.preset).requests[0]
+        return load_preset(self.paper.preset)[0]
 
     def explore(self, surface: str = '') -> tuple[Any, list[Any]]:
         """Explore as the paper did; return the result and the features of the launched nodes."""

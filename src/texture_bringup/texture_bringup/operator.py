@@ -10,13 +10,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Any
+from uuid import uuid4
 
-from action_msgs.msg import GoalStatus
+from action_msgs.msg import GoalInfo, GoalStatus
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import ParameterType
 from rclpy.action import ActionClient
+from rclpy.action.client import ClientGoalHandle
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -239,11 +241,17 @@ class Operator:
             self._heard_s = time.monotonic()
             on_progress(from_msg(message.feedback.state), from_msg(message.feedback.texture))
 
-        accepted = self._explore.send_goal_async(action.Explore.Goal(request=to_msg(request)), on_feedback)
+        goal_id = GoalInfo().goal_id
+        goal_id.uuid = list(uuid4().bytes)
+        accepted = self._explore.send_goal_async(action.Explore.Goal(request=to_msg(request)), on_feedback, goal_id)
         silent = 'the explorer accepts no request; stop it, and check that no second one runs'
         try:
             self._until(accepted.done, ACCEPT_S, silent, MotionAborted)
+        except MotionAborted:
+            self._withdraw(goal_id)
+            raise
         except KeyboardInterrupt:  # the explorer may have the request already
+            self._withdraw(goal_id)
             self._executor.spin_until_future_complete(accepted, CANCEL_DEADLINE_S)
             goal = accepted.result()
             raise KeyboardInterrupt(self._cancel(goal, goal.get_result_async()) if goal else _unconfirmed()) from None
@@ -453,6 +461,10 @@ class Operator:
     def _step(self) -> None:
         self._guard()
         self._executor.spin_once(timeout_sec=STEP_S)
+
+    def _withdraw(self, goal_id: Any) -> None:
+        """Cancel a request that was not accepted: an explorer that accepts it later must not run it."""
+        ClientGoalHandle(self._explore, goal_id, action.Explore.Impl.SendGoalService.Response()).cancel_goal_async()
 
     def _cancel(self, goal: Any, ending: Future) -> str:
         """Cancel, wait until the finger is lifted, and return in a sentence how it ended."""

@@ -10,7 +10,7 @@ import pytest
 from texture_core.config import folder
 from texture_estimation.domain import ONE_PLACE
 from texture_estimation.evidence import EvidenceAccumulator
-from texture_estimation.evidence_rules import SoftVote, running_means
+from texture_estimation.evidence_rules import SoftVote, followed
 from texture_estimation.learners.discriminant import Discriminant, ForceDiscriminant, linear_discriminant
 from texture_estimation.recipe import Recipe
 from texture_estimation.training import held_out_parts, in_places, train
@@ -43,26 +43,25 @@ def test_gaussian_classes_of_known_means_and_variance_get_their_probabilities():
     assert scores[:, 1] - scores[:, 0] == pytest.approx([-2.0, 0.0, 2.0], abs=0.15)
 
 
-def test_slides_of_one_day_are_held_out_together(examples):
-    parts = held_out_parts(of_days(examples))
-    slides = np.unique(examples.groups)
-    assert [part == int(slide[-1]) % 2 for part, slide in zip(parts.tolist(), slides.tolist(), strict=True)] == [
-        True
-    ] * len(slides)
+def day(slide):
+    return f'day {int(slide[-1]) % 2}'
 
 
-def test_without_days_slides_are_held_out_by_themselves(examples):
-    assert held_out_parts(examples) is None
-    assert held_out_parts(of_days(examples, days=1)) is None
-    by_slide = {slide: SlideConditions(session=slide) for slide in np.unique(examples.groups).tolist()}
-    assert held_out_parts(replace(examples, conditions=by_slide)) is None
-
-
-def test_places_are_held_out_in_turn_where_each_slide_has_a_separate_bag(examples):
+@pytest.mark.parametrize(
+    ('session', 'place', 'by_day'),
+    [
+        (day, lambda slide: '', True),
+        (lambda slide: slide, day, True),  # a bag for each slide defines no session, but places are held out
+        (lambda slide: slide, lambda slide: '', False),
+        (lambda slide: 'day 0', lambda slide: '', False),
+        (lambda slide: '', lambda slide: '', False),
+    ],
+)
+def test_slides_of_one_day_or_place_are_held_out_together_and_else_by_themselves(session, place, by_day, examples):
     slides = np.unique(examples.groups).tolist()
-    made = {slide: SlideConditions(session=slide, place=str(int(slide[-1]) % 2)) for slide in slides}
+    made = {slide: SlideConditions(session=session(slide), place=place(slide)) for slide in slides}
     parts = held_out_parts(replace(examples, conditions=made))
-    assert parts.tolist() == [int(slide[-1]) % 2 for slide in slides]
+    assert parts is None if not by_day else parts.tolist() == [int(slide[-1]) % 2 for slide in slides]
 
 
 def test_a_label_of_one_day_is_held_out_slide_by_slide(examples):
@@ -183,20 +182,15 @@ def test_held_out_slides_are_followed_as_the_classifier_follows_them(estimates_o
     examples = force_examples()
     rule = SoftVote(late_weight=0.25)
     evidence, trusted = np.log([[0.9, 0.1], [0.2, 0.8], [0.6, 0.4]]), np.array([0.25, 0.5, 0.5])
-    means = running_means(rule, evidence, np.array([1.0, 1.5, 2.0]), trusted)
+    means, _ = followed(rule, evidence, 0.5, trusted)
     assert means[0] == pytest.approx(0.25 * evidence[0])  # a quarter of a window is trusted
     assert means[1] == pytest.approx(0.5 * (0.25 * evidence[0] + 0.5 * evidence[1]) / 0.75)
     model = train(Recipe.from_mapping({**CONTENT, 'learner': 'force_discriminant'}, 'forces'), examples)
     forces = [1.0, 4.5, 40.0, 1.0]
     values = np.array([[3.0 if force < 2.0 else -3.0, force] for force in forces])
-    effective = 1.0 + 0.5 * np.arange(4)
-    followed = running_means(
-        model.recipe.evidence,
-        model.predict_log_proba(values),
-        effective,
-        np.array([model.trust(row) for row in values]),
-    )
-    expected = np.exp(model.recipe.evidence.log_posterior(followed, effective[:, None], model.tempering_exponent))
+    trusted = np.array([model.trust(row) for row in values])
+    means, effective = followed(model.recipe.evidence, model.predict_log_proba(values), 0.5, trusted)
+    expected = np.exp(model.recipe.evidence.log_posterior(means, effective[:, None], model.tempering_exponent))
     found = probabilities_after(estimates_of, model, forces)
     assert found == pytest.approx([model.acceptance.limited(row)[0] for row in expected])
 

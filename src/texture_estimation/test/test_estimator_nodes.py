@@ -13,12 +13,10 @@ from texture_msgs import msg, srv
 from texture_core.errors import ModelMismatch
 from texture_core.ros import ESTIMATE_QOS, FEATURE_QOS, from_msg, to_msg
 from texture_core.ros_testing import LocalGraph
-from texture_core.types import FeatureVector
 from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.model import load_model
 from texture_estimation.nodes.classifier import Classifier
 from texture_estimation.nodes.roughness_estimator import RoughnessEstimator
-from texture_estimation.recipe import Recipe
 from texture_estimation.roughness import (
     Grades,
     RoughnessAccumulator,
@@ -26,7 +24,6 @@ from texture_estimation.roughness import (
     load_roughness_model,
     train_grades,
 )
-from texture_estimation.training import train
 from texture_features.feature_set import LabelledFeatures
 
 pytestmark = pytest.mark.ros
@@ -34,8 +31,6 @@ GRADE_NAMES = ('signal/signal_energy/f', 'signal/peak_to_median_power/f')
 GRADE_RECIPE = {'inputs': {'signal': {'features': ['log_variance', 'peak_to_median_power']}}}
 NODES = {
     'classifier': (Classifier, 'model', 'cloth_slide'),
-    'classifier with trees': (Classifier, 'trees_model', 'cloth_slide'),
-    'classifier with tuned pairs': (Classifier, 'pairs_model', 'cloth_slide'),
     'roughness_estimator': (RoughnessEstimator, 'roughness_model', 'grade_2'),
 }
 
@@ -80,44 +75,9 @@ def graph():
         yield graph
 
 
-def slide(rows, names, feature_set, identity='e1', **more):
-    """Return the vectors of a slide: a window of each row, then the last one."""
-    windows = [
-        FeatureVector(number * 100_000_000, identity, 0.5, 0.1, names, row, feature_set=feature_set, **more)
-        for number, row in enumerate(rows)
-    ]
-    return [*windows, FeatureVector(10**9, identity, 0.0, 0.1, last=True)]
-
-
-@pytest.fixture(scope='module')
-def trees_model(examples):
-    """Return a model whose learner is a forest of scikit-learn."""
-    learner = {'sklearn': {'estimator': 'sklearn.ensemble:ExtraTreesClassifier', 'n_estimators': 20}}
-    recipe = {'inputs': {'signal': {'features': ['hjorth']}}, 'learner': learner}
-    return train(Recipe.from_mapping(recipe, 'trees'), examples)
-
-
-@pytest.fixture(scope='module')
-def pairs_model(examples):
-    """Return a model in which two pairs have separate features and learners."""
-    pairs = [
-        {
-            'pair': ['cork', 'felt'],
-            'inputs': ['signal'],
-            'learner': {'texture_papers.roberge:SvmPairs': {'kernel_scale': 2.0}},
-        },
-        {'pair': ['felt', 'wood'], 'learner': {'texture_papers.roberge:AnnPairs': {'hidden': 4}}},
-    ]
-    recipe = {
-        'inputs': {'signal': {'features': ['hjorth']}},
-        'learner': {'texture_papers.roberge:TunedPairs': {'pairs': pairs}},
-    }
-    return train(Recipe.from_mapping(recipe, 'pairs'), examples)
-
-
 @pytest.fixture
 def cloth_slide(examples):
-    return slide(examples.values[examples.groups == 'felt/0'], examples.names, examples.feature_set)
+    return examples.vectors('felt/0')
 
 
 @pytest.fixture(scope='module')
@@ -131,13 +91,9 @@ def roughness_model():
     return train_grades(RoughnessRecipe.from_mapping(GRADE_RECIPE, 'test'), examples, Grades(grades), 'felt')
 
 
-def slide_of_grade_2(roughness_model, windows=2, force_n=2.0):
-    return slide([np.array([2.0, 0.5])] * windows, GRADE_NAMES, roughness_model.feature_set, force_n=force_n)
-
-
 @pytest.fixture
-def grade_2(roughness_model):
-    return slide_of_grade_2(roughness_model)
+def grade_2(roughness_model, slide_of):
+    return slide_of(roughness_model, np.array([[2.0, 0.5]] * 2), force_n=2.0)
 
 
 @pytest.fixture(params=NODES)
@@ -215,11 +171,6 @@ def test_a_node_publishes_what_the_same_vectors_give_offline(graph, case):
             np.testing.assert_allclose(getattr(came, name), getattr(expected, name), rtol=1e-6)
     assert recognised(received[-1])
     assert received[-1].processing_s > 0.0
-
-
-def test_a_grade_of_a_known_surface_is_that_of_its_training(roughness_model, grade_2):
-    evidence = RoughnessAccumulator(roughness_model)
-    assert [evidence.update(vector) for vector in grade_2][-1].grade == pytest.approx(2.0, abs=0.3)
 
 
 def test_a_texture_is_learnt_from_one_exploration_kept_and_undone(graph, model, cloth_slide, tmp_path):

@@ -81,9 +81,6 @@ def test_a_training_that_would_take_too_long_makes_fewer_steps(make_examples, mo
     )  # four slides of each: four folds, and all
 
 
-SLIDES, WINDOWS = 20, 6
-
-
 def test_shrunk_to_the_diagonal_a_discriminant_is_that_of_independent_gaussians():
     rng = np.random.default_rng(0)
     X, y = rng.normal(size=(60, 3)) * [1.0, 2.0, 5.0], np.repeat([0, 1, 2], 20)

@@ -50,17 +50,11 @@ def test_few_examples_make_a_model_whose_card_states_how_it_is_calibrated(make_e
     assert np.isfinite(model.predict_log_proba(examples.values)).all()
 
 
-def pick(examples, rows):
-    return dataclasses.replace(
-        examples, values=examples.values[rows], labels=examples.labels[rows], groups=examples.groups[rows]
-    )
-
-
 def test_examples_unfit_for_training_get_a_sentence(examples):
     with pytest.raises(InvalidData, match='no windows for training'):
-        train(RECIPE, pick(examples, slice(0, 0)))
+        train(RECIPE, examples.take(slice(0, 0)))
     with pytest.raises(InvalidData, match="all windows are of 'cork'"):
-        train(RECIPE, pick(examples, examples.labels == 'cork'))
+        train(RECIPE, examples.take(examples.labels == 'cork'))
     values = examples.values.copy()
     values[3, 1] = np.nan
     with pytest.raises(InvalidData, match="'signal/f1' and 0 others are not finite in 1 of 384"):
@@ -85,7 +79,7 @@ def test_a_slide_of_a_class_that_was_left_out_is_unknown_at_every_estimate(make_
     labels = ('cork', 'felt', 'wood', 'slate', 'glass', 'paper')
     examples = make_examples(labels=labels, slides=12, features=8, seed=3)
     recipe = dataclasses.replace(RECIPE, training=dataclasses.replace(RECIPE.training, false_rejection_rate=0.05))
-    model = train(recipe, pick(examples, examples.labels != 'glass'))
+    model = train(recipe, examples.take(examples.labels != 'glass'))
     new = make_examples(labels=labels, slides=12, features=8, seed=4)
     known = {
         label: [e.accepted for n in range(12) for e in estimates_of(model, new.values[new.groups == f'{label}/{n}'])]
@@ -159,13 +153,3 @@ def test_every_label_is_always_trained_on():
     parameters, _ = assign_folds(codes, groups, 5)
     for part in range(5):
         assert set(codes[parameters != part]) == {0, 1}
-
-
-def test_a_label_with_one_slide_is_split_by_windows_and_the_note_states_it():
-    parameters, note = assign_folds(np.repeat([0, 1], 4), np.repeat([0, 1], 4), 2)
-    assert parameters.tolist() == [0, 0, 1, 1, 0, 0, 1, 1]
-    assert 'single slide' in note
-
-
-def test_a_label_with_one_window_cannot_be_divided():
-    assert assign_folds(np.array([0, 0, 1]), np.array([0, 1, 2]), 2) is None

@@ -388,7 +388,7 @@ class Acceptance:
         low, high = LEVELS[after - 1], LEVELS[after]
         weight = (effective_windows - low) / (high - low)
         pairs = zip(self._rows[after - 1], self._rows[after], strict=True)
-        return Limits(*(one if one == other else one + weight * (other - one) for one, other in pairs))
+        return Limits._make([one if one == other else one + weight * (other - one) for one, other in pairs])
 
     def assess(self, margin: float, distance: float, effective_windows: float) -> Assessment:
         """Return the decision about a slide from the margin of its label and the distance to the slides of it."""

@@ -91,11 +91,7 @@ TURNING_MOTIONS = ('circular',)
 REPLAYS = 'file/'  # a sensor that replays a file is named after the file, not after what measured
 OUTSIDE = 'outside the training'
 ONE_PLACE = 'trained at one place of each surface: elsewhere it may be rejected'
-REACH = {
-    'sessions': 'session',
-    'places': 'place',
-    'fingers': 'sensor',
-}  # and functions that return them for a slide
+REACH = {'sessions': 'session', 'places': 'place', 'fingers': 'sensor'}  # and what of a slide is counted
 
 
 @dataclass(frozen=True)
@@ -185,18 +181,13 @@ class Domain:
         sensor = '' if conditions.sensor.startswith(REPLAYS) else conditions.sensor
         if self.sensors and sensor and sensor not in self.sensors:
             yield f"sensor '{sensor}', trained {_listed(self.sensors)}"
-        for direction in self._untrained_directions(conditions)[:1]:
-            yield f'direction {direction:.3g} rad, trained {" and ".join(map(_range, self.directions_rad))} rad'
+        compared = () if conditions.motion in TURNING_MOTIONS or not self.directions_rad else conditions.directions_rad
+        if untrained := [direction for direction in compared if not self._covers(direction)]:
+            yield f'direction {untrained[0]:.3g} rad, trained {" and ".join(map(_range, self.directions_rad))} rad'
         for channel, rms, *_ in conditions.levels:
             trained = self.levels.get(channel)
             if is_beyond(rms, trained, self.margins.level):
                 yield f'signal level {rms:.3g} of {channel}, trained {_range(trained)}'
-
-    def _untrained_directions(self, conditions: SlideConditions | RunningConditions) -> list[float]:
-        """Return the directions of a slide outside the arcs; none where directions are not compared."""
-        if not self.directions_rad or conditions.motion in TURNING_MOTIONS:
-            return []
-        return [direction for direction in conditions.directions_rad if not self._covers(direction)]
 
     def _covers(self, direction_rad: float) -> bool:
         margin = self.margins.direction_rad

@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from texture_core.types import NANOSECONDS, Array, FeatureVector, Rejection, TextureEstimate
-from texture_estimation.acceptance import Acceptance, SlideDistance, margin_of
+from texture_estimation.acceptance import SlideDistance, margin_of
 from texture_estimation.evidence_rules import GroupedEvidence
 from texture_estimation.gaussians import GaussianClasses, SlideMoments
 from texture_estimation.learners.learner import is_tied
@@ -33,7 +33,6 @@ def no_window(windows: WindowParams) -> str:
     )
 
 
-UNTEMPERED = 1.0
 NO_MODEL = "no model is loaded; set the parameter 'model' of the classifier to the path of a trained one"
 
 
@@ -48,7 +47,7 @@ def single_decisions(model: TextureModel, values: Array) -> list[str]:
     evidence = rule.window_evidence(model.predict_log_proba(values))
     complete = len(values) // rule.group
     groups = evidence[: complete * rule.group].reshape(complete, rule.group, -1) if complete else evidence[None]
-    posteriors = rule.log_posterior(groups.mean(axis=1), float(groups.shape[1]), UNTEMPERED)
+    posteriors = rule.log_posterior(groups.mean(axis=1), float(groups.shape[1]), tempering_exponent=1.0)
     tied = is_tied(posteriors).tolist()
     best = posteriors.argmax(axis=-1).tolist()
     return ['' if none else model.labels[index] for index, none in zip(best, tied, strict=True)]
@@ -68,7 +67,7 @@ class EvidenceAccumulator:
         self.refused = 0
         self.not_finite = 0
         self._over = True
-        self._exploration_id = ''
+        self._exploration_id = self._message = ''
 
     def update(self, vector: FeatureVector) -> TextureEstimate:
         """Return the estimate after one more window, or the final one after the `last` vector."""
@@ -76,7 +75,11 @@ class EvidenceAccumulator:
             self._start(vector.exploration_id)
         if vector.last:
             self._over = True
-            self._note_skipped(vector.skipped)
+            if vector.skipped and not self._message:
+                windows = vector.skipped + self._windows
+                self._message = (
+                    f'{vector.skipped} of {windows} windows were left out, as samples were lost or not finite'
+                )
             return self._estimate(vector, final=True)
         if self.model is not None:
             self._predict(vector, self.model)
@@ -93,18 +96,10 @@ class EvidenceAccumulator:
             self.model.n_predicted if self.model else 0, self.model.recipe.evidence.group if self.model else 0
         )
         self._moments = SlideMoments(len(self.model.names)) if self.model and self.model.added_slides else None
-        self._zeros = np.zeros(len(self.model.names) if self.model else 0)
         distance = self.model.active_acceptance.distance if self.model else None
         self._distance = SlideDistance(distance) if distance else None
         self._conditions = RunningConditions()
         self._deviation = ''  # of these conditions from those of the training
-
-    def _note_skipped(self, skipped: int) -> None:
-        """State in the final estimate how much of the slide is missing from it."""
-        if skipped and not self._message:
-            self._message = (
-                f'{skipped} of {skipped + self._windows} windows were left out, as samples were lost or not finite'
-            )
 
     def _predict(self, vector: FeatureVector, model: TextureModel) -> None:
         if vector.feature_set != model.feature_set:
@@ -114,9 +109,10 @@ class EvidenceAccumulator:
                 f"model '{model.name}' does not fit: {fingerprint_difference(vector.feature_set, model.feature_set)}"
             )
             return
-        if math.isnan(vector.values @ self._zeros):  # faster than isfinite().all(): inf · 0 is NaN
+        finite = np.isfinite(vector.values)
+        if not finite.all():
             self.not_finite += 1
-            bad = vector.names[int((~np.isfinite(vector.values)).argmax())]
+            bad = vector.names[int(finite.argmin())]
             self._message = f"a window was left out: its feature '{bad}' is not finite"
             return
         self._conditions.update(vector)
@@ -158,17 +154,23 @@ class EvidenceAccumulator:
         if self._trusted_ns < self._window_ns:
             mean = mean * (self._trusted_ns / self._window_ns)
         deciding = self._evidence.time_s * NANOSECONDS / self._window_ns
-        probabilities = self._with_added(
-            model, model.recipe.evidence.posterior(mean, deciding, model.tempering_exponent), effective_windows
-        )
+        probabilities = model.recipe.evidence.posterior(mean, deciding, model.tempering_exponent)
+        added, moments = model.slide_gaussians, self._moments
+        if moments is not None and added is not None:
+            log_proba = added.log_proba(moments.mean, moments.variance, effective_windows)
+            probabilities = added.combined(probabilities, log_proba)
         listed = probabilities.tolist()
         confidence = max(listed)
         best, single = listed.index(confidence), listed.count(confidence) == 1
         acceptance = model.acceptance_of(best)
         second, first = sorted(mean.tolist())[-2:]  # of some tens of labels quicker than a partition
         margin = margin_of(first, second)
-        if self._moments is not None and model.slide_gaussians is not None:
-            margin = self._margin_to_added(model, listed, margin, deciding)
+        if moments is not None and added is not None:
+            # Gaussians of slides are tempered for the confidence; without that, they are of the size of the evidence.
+            second, first = (math.log(max(one, LEAST_PROBABILITY)) for one in sorted(listed)[-2:])
+            growth = deciding**model.tempering_exponent * GaussianClasses.inverse_temperature
+            to_added = margin_of(first / growth, second / growth)
+            margin = min(margin, to_added) if best < model.n_trained else to_added
         distance = self._distance.to(best) if self._distance else math.inf
         rejection, decided = acceptance.assess(margin, distance, effective_windows)
         if self._deviation:
@@ -176,7 +178,13 @@ class EvidenceAccumulator:
         elif not single and rejection is Rejection.NONE:
             rejection = Rejection.AMBIGUOUS
         reported = tuple(acceptance.limited(listed))
-        members = acceptance.members(probabilities, effective_windows) if final and not self._deviation else ()
+        members: list[int] = []
+        missing: tuple[str, ...] = ()
+        if final and not self._deviation:
+            members = acceptance.members(probabilities, effective_windows)
+            too_little = rejection is Rejection.TOO_LITTLE_TRAINING
+            reach = acceptance.domain.reach_reason if rejection is not Rejection.NONE else ''
+            missing = (acceptance.reason if too_little else acceptance.decided_reason, reach)
         return TextureEstimate(
             stamp_ns=self._end_ns,
             exploration_id=vector.exploration_id,
@@ -191,32 +199,5 @@ class EvidenceAccumulator:
             evidence_s=self._evidence_ns / NANOSECONDS,
             final=final,
             model=model.name,
-            message=self._explanation(acceptance, final, rejection),
+            message='; '.join(filter(None, (self._deviation, self._message, *missing))),
         )
-
-    @staticmethod
-    def _margin_to_added(model: TextureModel, probabilities: list[float], trained: float, deciding: float) -> float:
-        """Return the margin of the best label by the probabilities of all, or among the trained ones if it is less.
-
-        The Gaussians of slides are tempered for the confidence; without that, they are of the size of the evidence.
-        """
-        second, first = (math.log(max(one, LEAST_PROBABILITY)) for one in sorted(probabilities)[-2:])
-        growth = deciding**model.tempering_exponent * GaussianClasses.inverse_temperature
-        margin = margin_of(first / growth, second / growth)
-        return min(trained, margin) if max(probabilities[: model.n_trained]) == max(probabilities) else margin
-
-    def _with_added(self, model: TextureModel, trained: Array, effective_windows: float) -> Array:
-        """Return the probabilities of all labels from those of the trained textures among themselves."""
-        if self._moments is None or model.slide_gaussians is None:
-            return trained
-        log_proba = model.slide_gaussians.log_proba(self._moments.mean, self._moments.variance, effective_windows)
-        return model.slide_gaussians.combined(trained, log_proba)
-
-    def _explanation(self, acceptance: Acceptance, final: bool, rejection: Rejection) -> str:
-        """Return the message of an estimate for its reader, in sentences; '' if there is none."""
-        missing: tuple[str, ...] = ()
-        if final and not self._deviation:
-            too_little = rejection is Rejection.TOO_LITTLE_TRAINING
-            reach = acceptance.domain.reach_reason if rejection is not Rejection.NONE else ''
-            missing = (acceptance.reason if too_little else acceptance.decided_reason, reach)
-        return '; '.join(filter(None, (self._deviation, self._message, *missing)))

@@ -172,28 +172,23 @@ class GroupedEvidence:
             self.mean, self.time_s = self._sum / self._weight, self._time_s
 
 
-def running_means(rule: EvidenceRule, evidence: Array, effective_windows: Array, trusted: Array | float = 1.0) -> Array:
-    """Return the weighted mean evidence of a slide after each window, where all windows decide together."""
-    weights = np.broadcast_to(trusted * rule.window_weight(effective_windows), len(evidence))[:, None]
-    means: Array = np.cumsum(weights * evidence, axis=0) / np.cumsum(weights, axis=0)
-    if np.ndim(trusted):
-        added = np.cumsum(trusted * np.diff(effective_windows, prepend=0.0))
-        means *= np.minimum(added, 1.0)[:, None]
-    return means
-
-
 def followed(
     rule: EvidenceRule, evidence: Array, hop_ratio: float, trusted: Array | float = 1.0
 ) -> tuple[Array, Array]:
     """Return the mean evidence of a slide after each window, and the effective window count that it rests on."""
     counts = 1 + np.arange(len(evidence))
-    if not rule.group:
-        effective_windows: Array = 1.0 + np.arange(len(evidence), dtype=np.float64) * hop_ratio
-        return running_means(rule, evidence, effective_windows, trusted), effective_windows
-    first = np.maximum(counts // rule.group - 1, 0) * rule.group
-    stop = np.where(counts < rule.group, counts, first + rule.group)
-    means = np.stack([evidence[one:other].mean(axis=0) for one, other in zip(first, stop, strict=True)])
-    return means, 1.0 + (stop - first - 1.0) * hop_ratio
+    if rule.group:
+        first = np.maximum(counts // rule.group - 1, 0) * rule.group
+        stop = np.where(counts < rule.group, counts, first + rule.group)
+        newest = np.stack([evidence[one:other].mean(axis=0) for one, other in zip(first, stop, strict=True)])
+        return newest, 1.0 + (stop - first - 1.0) * hop_ratio
+    effective_windows: Array = 1.0 + np.arange(len(evidence), dtype=np.float64) * hop_ratio
+    weights = np.broadcast_to(trusted * rule.window_weight(effective_windows), len(evidence))[:, None]
+    means: Array = np.cumsum(weights * evidence, axis=0) / np.cumsum(weights, axis=0)
+    if np.ndim(trusted):
+        added = np.cumsum(trusted * np.diff(effective_windows, prepend=0.0))
+        means *= np.minimum(added, 1.0)[:, None]
+    return means, effective_windows
 
 
 EVIDENCE_RULES: Mapping[str, type[EvidenceRule]] = {

@@ -146,7 +146,9 @@ class SlideGaussians:
         )
         described = [fitted._described(part, hop_ratio) for part in parts]
         starts = [GaussianClasses.fit(np.stack(rows), classes, counts) for rows in zip(*described, strict=True)]
-        return replace(fitted, starts=tuple(map(_of_length, starts, lengths)))
+        short = sum(length < SPREAD_LENGTH for length in lengths)
+        starts[:short] = [replace(start, uncertainty_exponent=SHORT_EXPONENT) for start in starts[:short]]
+        return replace(fitted, starts=tuple(starts))
 
     def with_added(self, slides: Sequence[Array], codes: Codes, hop_ratio: float = 1.0) -> SlideGaussians:
         """Return the Gaussians of the trained textures and of these added slides, in place of others added before."""
@@ -172,10 +174,6 @@ class SlideGaussians:
         """Return the log-probability of each class for a slide so far."""
         place = max(bisect_right(self.lengths, effective_windows + 1e-9) - 1, 0)
         return self.starts[place].log_probabilities(self._descriptor(mean, variance, self.lengths[place]))
-
-    def window_log_proba(self, X: Array) -> Array:
-        """Return the log-probability of each class for windows alone."""
-        return self.windows.log_probabilities(X)
 
     def combined(self, trained: Array, log_proba: Array) -> Array:
         """Return the probability of each label: the trained textures keep the ratios of their probabilities."""
@@ -205,10 +203,6 @@ class SlideGaussians:
         if length < SPREAD_LENGTH:
             return mean
         return np.concatenate([mean, 0.5 * np.log(variance + self.spread_floor)])
-
-
-def _of_length(start: GaussianClasses, length: float) -> GaussianClasses:
-    return start if length >= SPREAD_LENGTH else replace(start, uncertainty_exponent=SHORT_EXPONENT)
 
 
 # --------------------

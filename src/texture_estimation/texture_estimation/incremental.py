@@ -1,25 +1,20 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Learn after the training from a few slides: add one while the model is used, or adapt it to another day."""
+"""Learn after the training from a few slides, while the model is used."""
 
 from __future__ import annotations
 
 import enum
 from collections import OrderedDict
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from texture_core.config import unknown_name
 from texture_core.errors import InvalidData
 from texture_core.types import Array, FeatureVector, checked_label
-from texture_estimation.acceptance import Acceptance
-from texture_estimation.learners.discriminant import Discriminant
-from texture_estimation.learners.learner import shrunk_covariance
 from texture_estimation.model import AddedSlide, TextureModel, remove_added_slide, stored_numbers, write_added_slide
-from texture_features.feature_set import LabelledFeatures, RunningConditions, SlideConditions
+from texture_features.feature_set import RunningConditions
 
 # Number of recent explorations that can be added, and of windows of each.
 EXPLORATIONS, WINDOWS = 20, 600
@@ -75,7 +70,9 @@ class IncrementalClassifier:
         self._refuse_second_time(name, label)
         added_slide = AddedSlide(label, name, np.stack(self._recent_windows[name]), self._conditions[name].get())
         if self._path is not None:
-            self._store(self._path, added_slide)
+            number = self._numbers[-1] + 1 if self._numbers else 1
+            write_added_slide(self._path, number, added_slide, self.model.feature_set)
+            self._numbers.append(number)
         self.model = self.model.with_added_slides((*self.model.added_slides, added_slide))
         return self.model.n_examples(label)
 
@@ -146,11 +143,6 @@ class IncrementalClassifier:
             self.model = self.model.with_added_slides(tuple(kept))
         return tuple(reversed(removed))
 
-    def _store(self, path: str | Path, added_slide: AddedSlide) -> None:
-        number = self._numbers[-1] + 1 if self._numbers else 1
-        write_added_slide(path, number, added_slide, self.model.feature_set)
-        self._numbers.append(number)
-
     def _refuse_removal(self, label: str) -> None:
         added = sorted({slide.label for slide in self.model.added_slides})
         if not added:
@@ -169,93 +161,3 @@ class IncrementalClassifier:
                 ChangeError.NOT_ADDED,
             )
         raise unknown_name(label, added, 'added texture')
-
-
-DIRECTIONS = 40  # of largest variance over slides, in which covariances can be estimated from some hundred slides
-SHRINKAGE = 0.1  # of the covariances, towards their diagonal and towards a round one
-DAY_SUFFIX = '-today'
-
-
-def adapted(model: TextureModel, training: LabelledFeatures, today: LabelledFeatures) -> TextureModel:
-    """Return the model as a discriminant whose classes are where slides of today and of the training place them.
-
-    A class of a session is Gaussian about its mean over sessions, and slides are Gaussian about the class of their
-    session (two covariances); the slides of today show where the classes are today, and each counts as much as it is
-    certain. A surface without a slide of today moves by the mean of those that have some. The answer is a label alone:
-    nothing shows which slides of today would be unknown, so none is accepted.
-
-    Source: Ioffe 2006, "Probabilistic linear discriminant analysis"; Prince & Elder 2007.
-    """
-    means, labels, sessions = _slide_means(training)
-    shots, shot_labels, _ = _slide_means(today)
-    names = list(model.trained_labels)
-    if strange := sorted(set(shot_labels) - set(names)):
-        raise InvalidData(f"'{strange[0]}' is not a trained surface; label the slides of today with {', '.join(names)}")
-    centre, scale = means.mean(axis=0), means.std(axis=0)
-    scale[scale <= 1e-9 * (1.0 + np.abs(centre))] = np.inf  # a constant feature carries no information
-    standard = (means - centre) / scale
-    axes = np.linalg.svd(standard, full_matrices=False)[2][:DIRECTIONS].T
-    points, seen = standard @ axes, ((shots - centre) / scale) @ axes
-    within, between, classes = _covariances(points, labels, sessions, names)
-    moved, uncertain = np.full_like(classes, np.nan), np.zeros_like(within)
-    for number, name in enumerate(names):
-        shots_of_class = seen[shot_labels == name]
-        if len(shots_of_class):
-            gain = between @ np.linalg.inv(between + within / len(shots_of_class))
-            moved[number] = classes[number] + gain @ (shots_of_class.mean(axis=0) - classes[number])
-            uncertain += (between - gain @ between) * len(shots_of_class) / len(seen)
-    shift = np.nanmean(moved - classes, axis=0)
-    moved = np.where(np.isnan(moved), classes + shift, moved)
-    weights = np.linalg.solve(within + uncertain, moved.T)
-    offsets = -0.5 * np.einsum('cf,fc->c', moved, weights)
-    weights = (axes @ weights) / scale[:, None]
-    return replace(
-        model,
-        name=f'{model.name}{DAY_SUFFIX}',
-        recipe=replace(model.recipe, learner_name='discriminant', learner=Discriminant()),
-        parameters={'weights': weights, 'offsets': offsets - centre @ weights},
-        acceptance=Acceptance(0, model.acceptance.rates, model.acceptance.domain),
-        next_touch_model=None,
-        examples=None,
-        added_slides=(),
-        slide_gaussians=None,
-        labels=model.trained_labels,
-    )
-
-
-def _slide_means(features: LabelledFeatures) -> tuple[Array, NDArray[np.str_], NDArray[np.str_]]:
-    """Return the mean features of slides, (n_slides, n_features), their labels and sessions."""
-    slides, rows, numbers = np.unique(features.groups, return_index=True, return_inverse=True)
-    means = np.stack([features.values[numbers == number].mean(axis=0) for number in range(len(slides))])
-    sessions = [features.conditions.get(name, SlideConditions()).session for name in slides.tolist()]
-    return means, features.labels[rows], np.array(sessions)
-
-
-def _covariances(
-    points: Array, labels: NDArray[np.str_], sessions: NDArray[np.str_], names: list[str]
-) -> tuple[Array, Array, Array]:
-    """Return the covariances within a session and between sessions of a label, and the mean of each label."""
-    classes, inside, across, groups = [], [], [], 0
-    for name in names:
-        of_class = labels == name
-        centres = []
-        for session in np.unique(sessions[of_class]):
-            group = points[of_class & (sessions == session)]
-            centres.append(group.mean(axis=0))
-            inside.append(group - centres[-1])
-            groups += 1
-        classes.append(np.mean(centres, axis=0))
-        if len(centres) > 1:
-            across.append(np.sqrt(len(centres) / (len(centres) - 1)) * (np.array(centres) - classes[-1]))
-    if not across:
-        raise InvalidData(
-            'the training has one session of each surface, which does not show how days differ; train on several '
-            'days, or train again with the slides of today'
-        )
-    deviations, shifts = np.concatenate(inside), np.concatenate(across)
-    within = deviations.T @ deviations / max(1, len(deviations) - groups)
-    between = shifts.T @ shifts / len(shifts)
-    size = len(within)
-    within = shrunk_covariance(within, SHRINKAGE)
-    between = (1.0 - SHRINKAGE) * between + SHRINKAGE * np.trace(between) / size * np.eye(size)
-    return within + 1e-9 * np.trace(within) / size * np.eye(size), between, np.array(classes)

@@ -54,7 +54,13 @@ def part_of(kind: Any, value: Any, where: str) -> Any:
     origin, given = get_origin(kind), get_args(kind)
     found: Any = None
     if is_dataclass(kind):
-        found = _dataclass_of(kind, value, where)
+        types = get_type_hints(kind)
+        if not isinstance(value, Mapping):
+            raise InvalidData(f'{where} is {safe_repr(value):.80}; the entries {", ".join(types)} are needed')
+        if set(types) != set(value):
+            raise InvalidData(f'{where} has the entries {", ".join(value)}; {", ".join(types)} are needed')
+        parts = {name: part_of(part_kind, value[name], f'{where}, {name}') for name, part_kind in types.items()}
+        found = kind(**parts)  # type: ignore[operator]
     elif origin is UnionType:  # such a part or None
         return None if value is None else part_of(given[0], value, where)
     elif origin is tuple and isinstance(value, list) and (given[-1] is ... or len(given) == len(value)):
@@ -71,16 +77,6 @@ def part_of(kind: Any, value: Any, where: str) -> Any:
     if found is None:
         raise InvalidData(f'{where} is {safe_repr(value):.80}; {kind} is needed')
     return found
-
-
-def _dataclass_of(kind: Any, value: Any, where: str) -> Any:
-    types = get_type_hints(kind)
-    if not isinstance(value, Mapping):
-        raise InvalidData(f'{where} is {safe_repr(value):.80}; the entries {", ".join(types)} are needed')
-    different = set(types) ^ set(value)
-    if different:
-        raise InvalidData(f'{where} has the entries {", ".join(value)}; {", ".join(types)} are needed')
-    return kind(**{name: part_of(part_kind, value[name], f'{where}, {name}') for name, part_kind in types.items()})
 
 
 # --------------------
@@ -258,11 +254,10 @@ def replace_file(path: Path, content: bytes) -> None:
 def _read_card(path: Path, given: str | Path) -> dict[str, Any]:
     try:
         card = load_json(path, MAX_CARD_BYTES)
+    except FileNotFoundError as error:
+        missing = f"card '{path}' of '{given}'" if Path(given).exists() else f"model '{given}'"
+        raise ModelMismatch(f'there is no {missing}; give the path of a trained model') from error
     except (OSError, ValueError) as error:
-        if isinstance(error, FileNotFoundError) and Path(given).exists():
-            raise ModelMismatch(f"there is no card '{path}' of '{given}'; give the path of a trained model") from error
-        if isinstance(error, FileNotFoundError):
-            raise ModelMismatch(f"there is no model '{given}'; give the path of a trained model") from error
         raise ModelMismatch(
             f"model card '{path}' cannot be read: {error}; '{given}' was given; give the path of a trained model"
         ) from error
@@ -521,7 +516,7 @@ class TextureModel(StoredModel):
         trained = log_softmax(self.predictor(X))
         if self.slide_gaussians is None or not self.added_slides:
             return trained
-        combined = self.slide_gaussians.combined(np.exp(trained), self.slide_gaussians.window_log_proba(X))
+        combined = self.slide_gaussians.combined(np.exp(trained), self.slide_gaussians.windows.log_probabilities(X))
         return np.log(np.maximum(combined, LEAST_PROBABILITY))
 
     def decide(self, X: Array) -> list[str]:
@@ -639,7 +634,7 @@ def load_model(path: str | Path) -> TextureModel:
         common = common_parts(tree)
         correction = read_correction(target)
         if correction is not None:
-            recipe = replace(recipe, feature_set=replace(recipe.feature_set, correction=correction, _layouts={}))
+            recipe = replace(recipe, feature_set=replace(recipe.feature_set, correction=correction))
             common['feature_set'] += f'{CORRECTED}{correction.fingerprint}'
         model = TextureModel(
             **common,

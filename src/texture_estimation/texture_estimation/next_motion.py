@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch
+from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.types import AnyArray, Array, FeatureVector, SlideMotion, group_similar
 from texture_estimation.gaussians import within_scale
 from texture_estimation.learners.learner import group_means, log_loss, log_softmax
@@ -75,12 +75,6 @@ class NextTouchModel:
     @classmethod
     def fit(cls, values: Array, textures: Sequence[str], motions: Sequence[SlideMotion]) -> NextTouchModel:
         """Learn from slides."""
-        values = np.asarray(values, dtype=np.float64)
-        if not len(values) == len(textures) == len(motions) > 0 or values.ndim != 2 or not np.isfinite(values).all():
-            raise InvalidData(
-                f'features of shape {values.shape} with {len(textures)} textures and {len(motions)} motions cannot be '
-                'trained on; give one row of finite values, one texture and one motion for each slide'
-            )
         names, codes = np.unique(np.asarray(textures), return_inverse=True)
         made = list(dict.fromkeys(motions))
         cells = np.array([made.index(motion) for motion in motions]) * len(names) + codes
@@ -115,20 +109,15 @@ class NextTouchModel:
 
     def update(self, log_prior: Array, motion: SlideMotion, values: Array) -> Array:
         """Return the log-posterior (n_textures,) after a slide with mean features (n_features,)."""
-        values = np.asarray(values, dtype=np.float64)
-        if values.shape != self.projection.shape[:1] or not np.isfinite(values).all():
-            wanted = f'{len(self.projection)} finite values, as the trained slides have'
-            raise InvalidData(f'features of shape {values.shape} do not describe a slide; give {wanted}')
-        return log_softmax(self._checked(log_prior) + log_likelihoods(values @ self.projection, self._means(motion)))
+        means = self.means[self.motions.index(motion)]
+        return log_softmax(log_prior + log_likelihoods(values @ self.projection, means))
 
     def information(self, log_posterior: Array, motion: SlideMotion) -> float:
         """Return the information in nats that a slide is expected to give, by its lower bound in closed form."""
-        return least_information(self._means(motion), self._checked(log_posterior))
+        return least_information(self.means[self.motions.index(motion)], log_softmax(log_posterior))
 
     def best_motion(self, log_posterior: Array, motions: Sequence[SlideMotion]) -> NextTouch:
         """Return the motion with the largest expected information gain; of equal ones the shortest."""
-        if not motions:
-            raise InvalidParameter('there is no motion to choose from; name at least one that was trained')
         choices = [NextTouch(motion, self.information(log_posterior, motion)) for motion in motions]
         most = max(choice.information for choice in choices)
         return min((c for c in choices if c.information >= most - SAME_NATS), key=lambda c: c.motion.duration_s)
@@ -138,19 +127,6 @@ class NextTouchModel:
         for motion in self.motions:
             if np.isnan(self.update(self.uniform_log_prior, motion, values)).any():
                 raise InvalidData(f'what textures look like under {motion} is not finite')
-
-    def _means(self, motion: SlideMotion) -> Array:
-        if motion not in self.motions:
-            known = '; '.join(map(str, self.motions))
-            raise InvalidParameter(f'{motion} is not in the training set; choose one of: {known}')
-        return np.asarray(self.means[self.motions.index(motion)])
-
-    def _checked(self, log_prior: Array) -> Array:
-        log_prior = np.asarray(log_prior, dtype=np.float64)
-        if log_prior.shape != (len(self.textures),) or not np.isfinite(log_prior.max()):
-            wanted = f'one for each of the {len(self.textures)} textures, of which at least one is possible'
-            raise InvalidData(f'log-probabilities of shape {log_prior.shape} do not fit; give {wanted}')
-        return log_softmax(log_prior)
 
 
 def slide_values(vectors: Sequence[FeatureVector], feature_set: str) -> Array:

@@ -208,16 +208,14 @@ class Recipe:
 
     def as_mapping(self) -> dict[str, Any]:
         """Return the recipe as a file writes it, every parameter spelt out."""
+        augmentation = {AUGMENTATION: dataclasses.asdict(self.augmentation)} if self.augmentation.copies else {}
         return {
             'description': self.description,
             **self.feature_set.as_mapping(),
             'learner': {self.learner_name: entry_of(self.learner)},
             'evidence': {self.evidence_name: dataclasses.asdict(self.evidence)},
-            'training': {**dataclasses.asdict(self.training), **self._augmentation_mapping()},
+            'training': {**dataclasses.asdict(self.training), **augmentation},
         }
-
-    def _augmentation_mapping(self) -> dict[str, Any]:
-        return {AUGMENTATION: dataclasses.asdict(self.augmentation)} if self.augmentation.copies else {}
 
 
 def _training(section: Any, where: str) -> tuple[DecisionParams, Augmentation]:

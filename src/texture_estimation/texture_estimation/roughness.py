@@ -51,16 +51,6 @@ def graded_columns(names: Sequence[str]) -> NDArray[np.intp]:
     return np.flatnonzero([name.split('/')[1:2] not in ([STICK_SLIP], [LEVEL]) for name in names])
 
 
-def limits_of(names: Sequence[str], values: Array) -> dict[str, float]:
-    """Return the largest STICK_SLIP and the least LEVEL to accept, from training windows (n, n_features)."""
-    limits = {}
-    if (columns := checked_columns(names, STICK_SLIP)).size:
-        limits[STICK_SLIP] = float(values[:, columns].max()) + STICK_SLIP_MARGIN
-    if (columns := checked_columns(names, LEVEL)).size:
-        limits[LEVEL] = float(values[:, columns].max(axis=1).min()) - QUIET_MARGIN
-    return limits
-
-
 # --------------------
 # Protocol of roughness regressors: parameters that fit graded windows and export a predictor.
 
@@ -502,32 +492,28 @@ class RoughnessAccumulator:
                 model=model.name if model else '',
                 message=self._message or (no_window(model.recipe.feature_set.windows) if model and vector.last else ''),
             )
-        shared, scatter = self._variances(model)
+        # More sliding does not lessen the variance that the windows share, but that of their mean: windows that overlap
+        # contribute the sliding time that they cover together.
+        count = self._windows
+        around = max(0.0, self._sum_squares - self._sum * self._sum / count)
+        of_windows = (PRIOR_WINDOWS * model.calibration.within_std**2 + around) / (PRIOR_WINDOWS + count - 1.0)
+        shared, scatter = self._sum_variances / count, of_windows * self._window_ns / self._evidence_ns
         std = math.sqrt(shared + scatter)
         to_gain = NORMAL_90 * (std - math.sqrt(shared))
-        narrow = self._windows >= MIN_WINDOWS and to_gain < MIN_NARROWING_GRADES
+        narrow = count >= MIN_WINDOWS and to_gain < MIN_NARROWING_GRADES
         return RoughnessEstimate(
             stamp_ns=self._end_ns,
             exploration_id=vector.exploration_id,
             frame_id=vector.frame_id,
             valid=True,
-            grade=min(max(self._sum / self._windows, SMOOTH), ROUGH),
+            grade=min(max(self._sum / count, SMOOTH), ROUGH),
             grade_std=std,
-            windows=self._windows,
+            windows=count,
             evidence_s=self._evidence_ns / NANOSECONDS,
             final=vector.last or narrow,
             model=model.name,
             message=self._message,
         )
-
-    def _variances(self, model: RoughnessModel) -> tuple[float, float]:
-        """Return the variance that more sliding does not lessen, and that of the mean of the windows so far."""
-        count = self._windows
-        around = max(0.0, self._sum_squares - self._sum * self._sum / count)
-        known = PRIOR_WINDOWS * model.calibration.within_std**2
-        scatter = (known + around) / (PRIOR_WINDOWS + count - 1.0)
-        # Windows that overlap contribute the sliding time that they cover together.
-        return self._sum_variances / count, scatter * self._window_ns / self._evidence_ns
 
 
 # --------------------
@@ -545,7 +531,13 @@ def train_grades(recipe: RoughnessRecipe, examples: LabelledFeatures, grades: Gr
     labels, codes = np.unique(examples.labels, return_inverse=True)
     table = {str(label): grades.of(str(label)) for label in labels}
     true = np.array([table[str(label)] for label in labels])[codes]
-    _check(examples)
+    bad = ~np.isfinite(examples.values).all(axis=0)
+    if bad.any():
+        name = examples.names[int(bad.argmax())]
+        raise InvalidData(
+            f"feature '{name}' and {int(bad.sum()) - 1} others are not finite; features of the surface need the speed "
+            'of every slide: record it, or leave these features out of the recipe'
+        )
     columns = graded_columns(examples.names)
     values = examples.values[:, columns]
     calibration, facts = Calibration(), {'calibration': f'not calibrated: fewer than {MIN_TEXTURES} textures'}
@@ -553,6 +545,11 @@ def train_grades(recipe: RoughnessRecipe, examples: LabelledFeatures, grades: Gr
         calibration, facts = calibrate(
             *hold_out(recipe.regressor, values, true, codes, recipe.training.folds), true, codes
         )
+    limits = {}
+    if (of_stick_slip := checked_columns(examples.names, STICK_SLIP)).size:
+        limits[STICK_SLIP] = float(examples.values[:, of_stick_slip].max()) + STICK_SLIP_MARGIN
+    if (of_level := checked_columns(examples.names, LEVEL)).size:
+        limits[LEVEL] = float(examples.values[:, of_level].max(axis=1).min()) - QUIET_MARGIN
     return RoughnessModel(
         name=name or recipe.name,
         names=examples.names,
@@ -560,7 +557,7 @@ def train_grades(recipe: RoughnessRecipe, examples: LabelledFeatures, grades: Gr
         recipe=recipe,
         parameters=recipe.regressor.fit(values, true, codes),
         calibration=calibration,
-        limits=limits_of(examples.names, examples.values),
+        limits=limits,
         grades=table,
         training={
             'windows': len(codes),
@@ -626,13 +623,3 @@ def calibrate(grades: Array, stds: Array, true: Array, textures: Codes) -> tuple
         'held_out_error': round(float(over_textures(np.abs(errors)).mean()), 4),
         'held_out_without_grade': round(missing, 4),
     }
-
-
-def _check(examples: LabelledFeatures) -> None:
-    bad = ~np.isfinite(examples.values).all(axis=0)
-    if bad.any():
-        name = examples.names[int(bad.argmax())]
-        raise InvalidData(
-            f"feature '{name}' and {int(bad.sum()) - 1} others are not finite; features of the surface need the speed "
-            'of every slide: record it, or leave these features out of the recipe'
-        )

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -37,7 +37,7 @@ from texture_estimation.learners.learner import (
 from texture_estimation.learners.mlp import AugmentedExamples
 from texture_estimation.model import TextureModel, TrainingExamples
 from texture_estimation.next_motion import NextTouchModel
-from texture_estimation.recipe import DecisionParams, Recipe
+from texture_estimation.recipe import Recipe
 from texture_features.augmentation import NOISE
 from texture_features.feature_set import LOAD, FeatureCopies, LabelledFeatures, SlideConditions
 
@@ -64,8 +64,11 @@ def fit_learner(
         return recipe.learner.fit(examples.values, codes, groups)
     times = _times(groups, examples, recipe.training.start_weight)
     rows = np.repeat(np.arange(len(codes)), times)
-    makers = {**EXTRAS, 'parts': lambda *_: parts}
-    extras = {name: makers[name](recipe, examples, codes, groups) for name in extras_of(recipe.learner)}
+    declared, extras = extras_of(recipe.learner), dict[str, Any]()
+    if 'augmented' in declared:
+        extras['augmented'] = _augmented_examples(recipe, examples, codes, groups)
+    if 'parts' in declared:
+        extras['parts'] = parts
     fit: Callable[..., Fitted] = recipe.learner.fit  # which takes the extras that the learner declares
     fitted = fit(*_with_resized(examples, codes, groups, rows), **extras)
     if fitted.held_out is None:
@@ -84,11 +87,9 @@ def _with_resized(examples: LabelledFeatures, codes: Codes, groups: Codes, rows:
     members = np.isin(examples.resized.groups, names)
     slides = np.searchsorted(names, examples.resized.groups[members])
     further = examples.resized.values[members], codes[first][slides], slides
-    return (
-        np.concatenate([taken[0], further[0]]),
-        np.concatenate([taken[1], further[1]]),
-        np.concatenate([taken[2], further[2]]),
-    )
+    both: Any = map(np.concatenate, zip(taken, further, strict=True))
+    values, labels, slides = both
+    return values, labels, slides
 
 
 def _times(runs: Codes, examples: LabelledFeatures, start_weight: int) -> Codes:
@@ -194,12 +195,6 @@ def _ranks(names: Any, rows: Codes) -> Codes:
     found, numbers = np.unique(names, return_inverse=True)
     first = np.array([rows[numbers == number].min() for number in range(len(found))])
     return np.argsort(np.argsort(first))[numbers]
-
-
-# What learners may declare as their `extras`: keyword arguments of `fit` in addition to the examples.
-EXTRAS: Mapping[str, Callable[[Recipe, LabelledFeatures, Codes, Codes], Any]] = {
-    'augmented': _augmented_examples,
-}
 
 
 # --------------------
@@ -376,7 +371,10 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
     """
     _check(examples)
     labels, codes = np.unique(examples.labels, return_inverse=True)
-    groups = np.unique(examples.groups, return_inverse=True)[1]
+    slides, first, groups = np.unique(examples.groups, return_index=True, return_inverse=True)
+    of_slides = examples.labels[first].tolist()
+    conditions = [examples.conditions.get(slide, SlideConditions()) for slide in slides.tolist()]
+    motions = [examples.motions.get(slide) for slide in slides.tolist()]
     hop_ratio = min(examples.hop_s / examples.window_s, 1.0)
     # Fit to all slides, and without some of them in turn.
     bound = replace(recipe, learner=of_examples(recipe.learner, examples.names, labels.tolist()))
@@ -384,26 +382,30 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
     tempering_exponent = fit_tempering_exponent(
         fitted, codes, groups, recipe.evidence, hop_ratio, temperature=fitted.temperature
     )
-    held_out = 0 if fitted.held_out is None else len(np.unique(groups))
     calibrated, truth = fitted, codes
-    acceptance = Acceptance(held_out, recipe.training.rates, _domain(examples, recipe.training))
+    domain = Domain.of_slides(conditions, of_slides, recipe.training.domain_margins)
+    acceptance = Acceptance(0 if fitted.held_out is None else len(slides), recipe.training.rates, domain)
     if not acceptance.reason:
-        slides = Followed(bound, examples)
-        near = [*slides.held_out(fitted, fitted.temperature, None)]
+        followed_slides = Followed(bound, examples)
+        near = [*followed_slides.held_out(fitted, fitted.temperature, None)]
         far: list[HeldOutSlide] = []
         # Where slides are of several places, sessions or fingers, also fit without each of these in turn.
         placed = in_places(examples, recipe.training.held_out_places)
         parts = held_out_parts(placed, by_speed=bool(recipe.training.slowest_m_s))
         if parts is not None:
-            kinds, slides_of = (np.unique(names, return_inverse=True)[1] for names in (placed.labels, placed.groups))
-            without = fit_learner(bound, placed, kinds, slides_of, parts)
+            kinds, parts_of = (np.unique(names, return_inverse=True)[1] for names in (placed.labels, placed.groups))
+            without = fit_learner(bound, placed, kinds, parts_of, parts)
             calibrated, truth = without, kinds
             far = [*Followed(bound, placed).held_out(without, fitted.temperature, parts)]
             tempering_exponent = fit_tempering_exponent(
-                without, kinds, slides_of, recipe.evidence, hop_ratio, temperature=fitted.temperature
+                without, kinds, parts_of, recipe.evidence, hop_ratio, temperature=fitted.temperature
             )
-        distance = slides.distance(bound.learner.predictor(fitted.parameters))
+        distance = followed_slides.distance(bound.learner.predictor(fitted.parameters))
         acceptance = acceptance.fitted(near, far, recipe.evidence, tempering_exponent, distance)
+    accuracy = None
+    if calibrated.held_out is not None:
+        right = (calibrated.held_out.argmax(axis=1) == truth) & ~is_tied(calibrated.held_out)
+        accuracy = round(float(right.mean()), 4)
     return TextureModel(
         name=name or recipe.name,
         labels=tuple(labels.tolist()),
@@ -413,14 +415,14 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
         parameters=fitted.parameters,
         tempering_exponent=tempering_exponent,
         acceptance=acceptance,
-        next_touch_model=_fit_next_touch_model(examples),
+        next_touch_model=NextTouchModel.of_slides(group_means(examples.values, groups), of_slides, motions),
         training={
             'windows': len(codes),
-            'slides': len(np.unique(groups)),
+            'slides': len(slides),
             'window_s': examples.window_s,
             'hop_s': examples.hop_s,
             'calibration': calibrated.note,
-            'held_out_window_accuracy': _held_out_accuracy(calibrated, truth),
+            'held_out_window_accuracy': accuracy,
         },
         examples=TrainingExamples.of(examples.values, codes, groups),
     )
@@ -440,25 +442,3 @@ def _check(examples: LabelledFeatures) -> None:
             f"feature '{name}' and {int(bad.sum()) - 1} others are not finite in {windows} of {len(examples.labels)} "
             'windows; leave these features out of the recipe, or these windows out of the examples'
         )
-
-
-def _fit_next_touch_model(examples: LabelledFeatures) -> NextTouchModel | None:
-    """Return what textures look like under each motion, from the mean features of slides."""
-    slides, first, groups = np.unique(examples.groups, return_index=True, return_inverse=True)
-    means = group_means(examples.values, groups)
-    made = [examples.motions.get(slide) for slide in slides.tolist()]
-    return NextTouchModel.of_slides(means, examples.labels[first].tolist(), made)
-
-
-def _domain(examples: LabelledFeatures, params: DecisionParams) -> Domain:
-    """Return the conditions under which the slides were made."""
-    slides, first = np.unique(examples.groups, return_index=True)
-    conditions = [examples.conditions.get(slide, SlideConditions()) for slide in slides.tolist()]
-    return Domain.of_slides(conditions, examples.labels[first].tolist(), params.domain_margins)
-
-
-def _held_out_accuracy(fitted: Fitted, codes: Codes) -> float | None:
-    if fitted.held_out is None:
-        return None
-    right = (fitted.held_out.argmax(axis=1) == codes) & ~is_tied(fitted.held_out)
-    return round(float(right.mean()), 4)

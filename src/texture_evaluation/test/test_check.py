@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData
-from texture_core.types import ExplorationRequest, Phase
+from texture_core.types import ExplorationRequest
 from texture_estimation.model import load_model
 from texture_evaluation.check import check_finger, store_reference
 from texture_evaluation.train import train_from_bags
@@ -17,13 +17,14 @@ from texture_features.feature_set import FeatureSet
 from texture_recordings.dataset import SlideDataset
 from texture_simulation.offline import SlidePlan, write_simulated
 
+PLAN = SlidePlan(slides=6, speed_m_s=0.05, force_n=1.0, slide_s=3.0)
+
 
 @pytest.fixture(scope='module')
 def trained(tmp_path_factory):
     """A model of three surfaces, and six slides over one of them, its reference plate."""
     folder = tmp_path_factory.mktemp('check')
-    plan = SlidePlan(slides=6, speed_m_s=0.05, force_n=1.0, slide_s=3.0)
-    bags = write_simulated(folder / 'bags', plan, np.random.default_rng(0), surfaces=('glass', 'leather', 'cardboard'))
+    bags = write_simulated(folder / 'bags', PLAN, np.random.default_rng(0), surfaces=('glass', 'leather', 'cardboard'))
     train_from_bags('default', bags, out=folder / 'three')
     return folder / 'three', SlideDataset.from_bags([folder / 'bags' / 'leather']).slides
 
@@ -99,33 +100,7 @@ def test_a_reference_is_stored_only_if_a_second_slide_shows_the_same(trained):
     assert not path.exists()
 
 
-def approached_for_longer(slide, seconds=0.7):
-    """The slide with rest before it: its first samples, quiet, once more."""
-
-    def later(one):
-        quiet = np.random.default_rng(1).standard_normal((round(seconds * one.sampling_rate_hz), one.samples.shape[1]))
-        return replace(one, samples=np.concatenate([0.1 * quiet.astype(np.float32), one.samples]))
-
-    states = [
-        replace(one, stamp_ns=one.stamp_ns + round(seconds * 1e9) * (one.phase is not Phase.APPROACH))
-        for one in slide.states
-    ]
-    signals = {
-        topic: [later(batches[0]), *(replace(one, stamp_ns=one.stamp_ns + round(seconds * 1e9)) for one in batches[1:])]
-        for topic, batches in slide.signals.items()
-    }
-    signals = {
-        topic: [replace(one, first_sample=n) for n, one in zip(starts(batches), batches, strict=True)]
-        for topic, batches in signals.items()
-    }
-    return replace(slide, states=states, signals=signals)
-
-
-def starts(batches):
-    return np.cumsum([0, *(len(one.samples) for one in batches[:-1])]).tolist()
-
-
-def test_noise_and_drift_are_measured_where_there_is_rest_and_else_reported_as_missing(trained):
+def test_noise_and_drift_are_measured_where_there_is_rest_and_else_reported_as_missing(trained, tmp_path, monkeypatch):
     model, slides = trained
     stored = store_reference(model, TOPICS, slides[:2])
     assert 'noise and drift were not measured' in stored
@@ -134,7 +109,9 @@ def test_noise_and_drift_are_measured_where_there_is_rest_and_else_reported_as_m
     assert as_trained and sentence.startswith('gain and response are as trained, noise and drift were not measured')
     assert 'nan' not in sentence
 
-    longer = [approached_for_longer(one) for one in slides[:3]]
+    monkeypatch.setattr('texture_simulation.offline.APPROACH_S', 0.9)
+    [bag] = write_simulated(tmp_path, replace(PLAN, slides=3), np.random.default_rng(1), surfaces=('leather',))
+    longer = SlideDataset.from_bags([bag]).slides
     assert 'not measured' not in store_reference(model, TOPICS, longer[:2])
     as_trained, sentence = check(model, longer[2])
     assert as_trained and sentence.startswith('the finger is as trained: signal gain ')

@@ -68,9 +68,6 @@ def test_rows_of_the_confusion_table_are_the_true_surfaces() -> None:
 def test_what_is_not_classified_counts_as_not_recognised_and_stands_in_no_column() -> None:
     silent = SlideResult('a', ['', 'a'], [TextureEstimate(0, 'e', windows=1, evidence_s=0.5)])
     assert metrics.unclassified_windows([silent, *RESULTS]) == pytest.approx(1 / 14)
-    assert metrics.unclassified_at_times([silent, *RESULTS]) == {
-        '0.5': pytest.approx(1 / 3), '1.0': 0.0, '2.5': None, '5.0': None,
-    }  # fmt: skip
     assert metrics.accuracy_at([silent], 0.5) == 0.0
     np.testing.assert_array_equal(metrics.confusion([silent], ('a', 'b')), [[1, 0], [0, 0]])
 
@@ -88,12 +85,6 @@ def test_confidence_that_equals_its_accuracy_has_no_calibration_error() -> None:
     honest = [slide('a', 'aaab', confidences=(0.75,) * 4)]
     assert metrics.calibration_error(honest) == pytest.approx(0.0)
     assert metrics.calibration_error([slide('a', 'bbbb', confidences=(0.9,) * 4)]) == pytest.approx(0.9)
-
-
-def test_candidates_are_counted_at_the_end_where_there_are_any() -> None:
-    ends = [TextureEstimate(0, 'e', 'a', prediction_set=names) for names in (('a',), ('b', 'a'), ('b',), ())]
-    results = [SlideResult('a', [], [end]) for end in ends]
-    assert metrics.candidates(results) == {'coverage': pytest.approx(2 / 3), 'mean_size': pytest.approx(4 / 3)}
 
 
 def test_accepted_but_wrong_is_counted_once_decided_and_at_the_end() -> None:

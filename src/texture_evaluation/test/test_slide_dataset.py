@@ -88,12 +88,6 @@ def test_slides_are_selected_by_number_label_and_condition() -> None:
         dataset.select('9')
 
 
-def test_speeds_within_five_per_cent_are_one_condition() -> None:
-    speed = from_arrays().condition('speed')
-    assert len(set(speed)) == 2
-    np.testing.assert_array_equal(speed, [0.02, 0.02, 0.04, 0.04, 0.04, 0.02])
-
-
 def test_an_unknown_condition_or_one_that_slides_do_not_tell_is_refused() -> None:
     with pytest.raises(InvalidData, match="no condition 'colour'; use one of speed, force"):
         from_arrays().condition('colour')
@@ -101,12 +95,18 @@ def test_an_unknown_condition_or_one_that_slides_do_not_tell_is_refused() -> Non
         from_arrays(force_n=math.nan).condition('force')
 
 
-def test_conditions_name_motion_sensor_session_and_number() -> None:
-    dataset = from_arrays(sensor='finger', session='monday')
-    assert set(dataset.condition('motion')) == {'linear_slide'}
-    assert set(dataset.condition('sensor')) == {'finger'}
-    assert set(dataset.condition('session')) == {'monday'}
-    assert dataset.condition('number').tolist() == [1, 1, 2, 2, 3, 3]
+@pytest.mark.parametrize(
+    ('condition', 'expected'),
+    [
+        ('motion', ['linear_slide'] * 6),
+        ('sensor', ['finger'] * 6),
+        ('session', ['monday'] * 6),
+        ('number', [1, 1, 2, 2, 3, 3]),
+        ('speed', [0.02, 0.02, 0.04, 0.04, 0.04, 0.02]),  # within five per cent they are one
+    ],
+)
+def test_conditions_are_told_of_each_slide(condition: str, expected: list) -> None:
+    assert from_arrays(sensor='finger', session='monday').condition(condition).tolist() == expected
 
 
 def test_a_missing_input_is_refused_with_what_there_is() -> None:
@@ -146,11 +146,8 @@ def test_lost_samples_leave_windows_out_but_are_refused_where_all_are_needed(tmp
     dataset = SlideDataset.from_bags([tmp_path / 'bag'])
     windows = WindowParams(length_s=0.5, hop_s=0.5)
     [(_, events)] = dataset.windows(FeatureSet(windows, FEATURES.inputs))
-    assert [event.start_ns for event in events if isinstance(event, CutWindow)] == [
-        0,
-        NANOSECONDS,
-        3 * NANOSECONDS // 2,
-    ]
+    starts = [event.start_ns for event in events if isinstance(event, CutWindow)]
+    assert starts == [0, NANOSECONDS, 3 * NANOSECONDS // 2]
     with pytest.raises(InvalidData, match='has lost samples'):
         dataset.to_numpy()
 
@@ -205,9 +202,7 @@ def test_slides_without_a_whole_window_are_refused_with_a_sentence(tmp_path: Pat
         SlideDataset.from_bags(bags).features(BAG_FEATURES)
 
 
-def test_a_joined_recipe_is_trained_from_bags_of_two_fingers(
-    tmp_path: Path,
-) -> None:
+def test_a_joined_recipe_is_trained_from_bags_of_two_fingers(tmp_path: Path) -> None:
     plan = SlidePlan(slides=6, slide_s=1.2, fingers=2)
     bags = write_simulated(tmp_path, plan, np.random.default_rng(3), surfaces=('glass', 'ridge_2mm_deep'))
     model = train_from_bags('two-fingers', bags, '1-4')
@@ -218,8 +213,7 @@ def test_a_joined_recipe_is_trained_from_bags_of_two_fingers(
         first, second = (slide.signals[topic] for topic in topics)
         assert first[0].stamp_ns == second[0].stamp_ns
         assert not np.array_equal(first[0].samples, second[0].samples)
-    figures = evaluate(model, bags, '5-6').as_json()
-    assert figures['window_accuracy'] > 0.9
+    assert evaluate(model, bags, '5-6').as_json()['window_accuracy'] > 0.9
 
 
 def ramps(count: int = 2, speed_m_s: object = math.nan, **more: object) -> SlideDataset:
@@ -244,26 +238,18 @@ def test_parts_of_equal_time_hold_every_sample_once_and_windows_never_span_two()
         np.concatenate(cut.to_numpy()[0][:4])[:, 0], (np.arange(4000) / RATE_HZ).astype(np.float32)
     )
     for slide, events in cut.windows(FEATURES):
-        starts = [event.start_ns for event in events if isinstance(event, CutWindow)]
-        first = int(slide.place[0]) - 1
-        assert [start // NANOSECONDS % 5 for start in starts[:2]] == [first] * 2
-        for event in events:
-            if isinstance(event, CutWindow):
-                times = event.windows['signal'].samples[:, 0]
-                assert first - 1e-3 <= times[0] < times[-1] < first + 1.0
+        first, windows = int(slide.place[0]) - 1, [event for event in events if isinstance(event, CutWindow)]
+        assert [window.start_ns // NANOSECONDS % 5 for window in windows[:2]] == [first] * 2
+        for times in (window.windows['signal'].samples[:, 0] for window in windows):
+            assert first - 1e-3 <= times[0] < times[-1] < first + 1.0
 
 
 def test_parts_are_of_equal_distance_where_slides_tell_their_speed() -> None:
-    halves = ramps(speed_m_s=[0.02, 0.02]).slides
-    state = halves[0].states[0]
-    slow_then_fast = replace(
-        halves[0],
-        states=(
-            replace(state, steady_s=2.0, speed_m_s=0.01),
-            replace(state, steady_s=2.0, speed_m_s=0.03, stamp_ns=2 * NANOSECONDS),
-        ),
-    )  # 20 mm in the first 2 s on a line between the two speeds, then 60 mm
-    first, second = spans(SlideDataset((slow_then_fast,)).in_parts(2)).values()
+    [slide, _] = ramps(speed_m_s=[0.02, 0.02]).slides
+    slow = replace(slide.states[0], steady_s=2.0, speed_m_s=0.01)
+    states = (slow, replace(slow, speed_m_s=0.03, stamp_ns=2 * NANOSECONDS))
+    # 20 mm in the first 2 s on a line between the two speeds, then 60 mm
+    first, second = spans(SlideDataset((replace(slide, states=states),)).in_parts(2)).values()
     # 10 mm/s rising to 30 within 2 s are 40 mm, half of the whole 100 mm is reached a third of a second later
     assert first[1] == pytest.approx(2.333, abs=5e-3)
     assert second[0] == pytest.approx(first[1] + 1e-3, abs=1e-6)
@@ -277,12 +263,10 @@ def test_slides_the_other_way_are_counted_from_the_other_end() -> None:
 
 def test_positions_make_the_place_whatever_the_time() -> None:
     def at(slide: object, *x_m: float) -> object:
-        state = slide.states[0]
-        places = [
-            replace(state, stamp_ns=state.stamp_ns + k * NANOSECONDS, steady_s=1.0, x_m=x, y_m=0.0)
-            for k, x in enumerate(x_m)
-        ]
-        return replace(slide, states=tuple(places))
+        state = replace(slide.states[0], steady_s=1.0, y_m=0.0)
+        stamps_ns = range(state.stamp_ns, state.stamp_ns + 4 * NANOSECONDS, NANOSECONDS)
+        states = [replace(state, stamp_ns=stamp, x_m=x) for stamp, x in zip(stamps_ns, x_m, strict=True)]
+        return replace(slide, states=tuple(states))
 
     one, other = (slide for slide in ramps(4) if slide.surface == 'cork')
     cut = SlideDataset((at(one, 0.0, 0.01, 0.02, 0.03), at(other, 0.03, 0.032, 0.036, 0.04))).in_parts(2)

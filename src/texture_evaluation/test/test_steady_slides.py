@@ -8,7 +8,7 @@ import pytest
 
 from texture_core.errors import InvalidData, UnknownName
 from texture_core.types import NANOSECONDS, Phase, lost_samples
-from texture_features.features.taxels import SpatialBands
+from texture_features.features.taxels import MeanSpatialBands
 from texture_recordings.bags import read_bag
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.public_sets import IMPORTS, evenly
@@ -158,7 +158,7 @@ def test_a_stroke_by_hand_is_one_channel_of_sound_without_conditions(tmp_path: P
 
 def test_the_line_of_a_printed_grating_stands_at_one_over_its_pitch_at_every_speed(tmp_path: Path) -> None:
     (board,) = import_fabricslide(make_fabricslide(tmp_path / 'in'), tmp_path / 'out', materials=['Board10mm'])
-    bands = SpatialBands(bands=40, longest_m=0.05, shortest_m=2.5e-3, floor=1e-3)
+    bands = MeanSpatialBands(bands=40, longest_m=0.05, shortest_m=2.5e-3, floor=1e-3)
     for slide in SlideDataset.from_bags([board]).samples('signal_static'):
         highest = bands(slide.windows()).argmax(axis=-1)
         assert bands.edges_per_m[highest] == pytest.approx(1 / PITCH_M, rel=0.1)

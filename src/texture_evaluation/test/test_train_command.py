@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from texture_core.config import refuse_inputs
-from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch, UnknownName
+from texture_core.errors import InvalidParameter, ModelMismatch
 from texture_core.types import TactileSignal
 from texture_estimation.model import TextureModel, both_files, load_model
 from texture_estimation.recipe import Recipe
@@ -18,12 +18,11 @@ from texture_estimation.roughness import load_roughness_model
 from texture_estimation.training import train
 from texture_evaluation.charts import refuse_chart_format
 from texture_evaluation.commands.train import summary
-from texture_evaluation.evaluate import evaluate, evaluate_dataset
+from texture_evaluation.evaluate import evaluate
 from texture_evaluation.evaluate import summary as report_summary
 from texture_evaluation.train import train_from_bags, train_grades_from_bags
 from texture_features.feature_set import LabelledFeatures, read_recipe
 from texture_recordings.bags import BagWriter, read_bag
-from texture_recordings.dataset import SlideDataset
 from texture_recordings.mapping import mapping_from
 from texture_recordings.tables import import_tables
 
@@ -108,52 +107,29 @@ def test_a_recipe_of_taxels_names_the_streams_that_a_recording_of_vibration_has(
         train_from_bags('taxels-any-day', [noise])
 
 
-GRADES = ('texture,grade', 'glass,1', 'leather,3', 'ridge_2mm_deep,5')
-
-
-def table(folder, lines):
-    path = folder / 'grades.csv'
-    path.write_text('\n'.join(lines) + '\n', encoding='utf-8')
-    return path
-
-
 def test_bags_and_grades_make_a_model_whose_card_lists_them(simulated, tmp_path) -> None:
-    train_grades_from_bags('roughness', [simulated], table(tmp_path, GRADES), '1-4', tmp_path / 'rough.npz')
+    (tmp_path / 'grades.csv').write_text('texture,grade\nglass,1\nleather,3\nridge_2mm_deep,5\n')
+    train_grades_from_bags('roughness', [simulated], tmp_path / 'grades.csv', '1-4', tmp_path / 'rough.npz')
     model = load_roughness_model(tmp_path / 'rough')
     assert model.name == 'rough'
     assert model.grades == {'glass': 1.0, 'leather': 3.0, 'ridge_2mm_deep': 5.0}
     card = json.loads((tmp_path / 'rough.json').read_text(encoding='utf-8'))
     assert card['data']['slides'] == '1-4'
     assert card['training']['slides'] == 12
-
-
-def test_both_files_of_a_model_report_the_extractor_how_to_describe(simulated, tmp_path) -> None:
-    train_grades_from_bags('roughness', [simulated], table(tmp_path, GRADES), '1-2', tmp_path / 'rough')
     by_card, by_model = (read_recipe(str(tmp_path / name))[1] for name in ('rough.json', 'rough.npz'))
-    assert by_card == by_model
-    assert 'inputs' in by_card
+    assert by_card == by_model and 'inputs' in by_card
 
 
-def test_a_surface_without_a_grade_is_named(simulated, tmp_path) -> None:
-    with pytest.raises(UnknownName, match="grade for the texture 'leather'"):
-        train_grades_from_bags('roughness', [simulated], table(tmp_path, [GRADES[0], GRADES[1], GRADES[3]]))
-
-
-@pytest.mark.parametrize('model', ['m1', 'm1.npz', 'm1.json'])
-@pytest.mark.parametrize('output', ['m1.json', './m1.json', 'm1.npz', 'sub/../m1.json'])
-def test_the_files_of_a_model_that_is_read_are_not_overwritten(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, model: str, output: str
+@pytest.mark.parametrize('output', ['m1.json', './m1.json', 'm1.npz', 'sub/../m1.json', 'own.yaml'])
+def test_files_that_are_read_are_not_overwritten_and_another_may_be(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, output: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / 'sub').mkdir()
-    with pytest.raises(InvalidParameter, match='would overwrite'):
-        refuse_inputs([output], both_files(model))
-
-
-def test_a_recipe_that_is_read_is_not_overwritten_and_another_file_may_be(tmp_path: Path) -> None:
-    with pytest.raises(InvalidParameter, match='would overwrite'):
-        refuse_inputs([tmp_path / 'own.yaml'], [tmp_path / 'own.yaml', tmp_path / 'bags'])
-    refuse_inputs([tmp_path / 'figures.json', None], [*both_files('m1'), tmp_path / 'bags'])
+    for model in ('m1', 'm1.npz', 'm1.json'):
+        with pytest.raises(InvalidParameter, match='would overwrite'):
+            refuse_inputs([output], [*both_files(model), 'own.yaml'])
+    refuse_inputs(['figures.json', None], [*both_files('m1'), 'own.yaml', tmp_path / 'bags'])
 
 
 def test_a_chart_is_a_png_svg_or_pdf_and_others_are_refused() -> None:
@@ -227,23 +203,5 @@ def test_another_rate_is_refused_and_nothing_is_scored(
         evaluate(evaluated, [tmp_path / 'slow'])
 
 
-def test_of_two_fingers_in_a_bag_one_is_named(evaluated: TextureModel, simulated: Path, tmp_path: Path) -> None:
-    with BagWriter(tmp_path / 'two') as bag:
-        for topic, log_ns, value in read_bag(simulated / 'glass'):
-            bag.write(f'/left/{topic}', value, log_ns)
-            bag.write(f'/right/{topic}', value, log_ns)
-    with pytest.raises(InvalidData, match='namespaces /left, /right'):
-        evaluate(evaluated, [tmp_path / 'two'])
-    left = SlideDataset.from_bags([tmp_path / 'two'], namespace='/left')
-    assert len(evaluate_dataset(evaluated, left).known) == 6
-
-
 def halved(signal: TactileSignal) -> TactileSignal:
     return replace(signal, sampling_rate_hz=500.0, first_sample=signal.first_sample // 2, samples=signal.samples[::2])
-
-
-def test_a_wrong_recipe_or_model_is_refused(simulated: Path, tmp_path: Path) -> None:
-    with pytest.raises(UnknownName, match="did you mean 'default'"):
-        train_from_bags('defalt', [simulated])
-    with pytest.raises(ModelMismatch, match='there is no model'):
-        load_model(tmp_path / 'none')

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Check a finger by a slide over one reference plate: store, compare, correct; adapt a model to a day."""
+"""Check a finger by a slide over one reference plate: store, compare, correct."""
 
 from __future__ import annotations
 
@@ -12,9 +12,6 @@ import numpy as np
 from texture_core.config import write_json
 from texture_core.errors import InvalidData
 from texture_core.types import Array, ExplorationRequest, Phase
-from texture_estimation.incremental import DAY_SUFFIX, adapted
-from texture_estimation.model import load_model, model_stem
-from texture_evaluation.train import training_examples
 from texture_features.correction import (
     CORRECTION,
     RESPONSE_DB,
@@ -26,7 +23,6 @@ from texture_features.correction import (
     file_next_to,
     write_reference,
 )
-from texture_recordings.dataset import SlideDataset
 from texture_recordings.slides import LabelledSlide, SlideSamples
 
 TOUCH_NS = 200_000_000  # the skin feels a touch before the arm does
@@ -71,7 +67,8 @@ def store_reference(
             f'nothing is stored, for two slides over the plate differ: {"; ".join(faults)}. Clean and fasten the '
             'finger, stop other programs on the computer, and store again'
         )
-    path = write_reference(model, last, _numbers_of(request) if request else _numbers_shown(slides[-1]))
+    made = {name: getattr(request, name) for name in SLIDE_NUMBERS} if request else _numbers_shown(slides[-1])
+    path = write_reference(model, last, made)
     unknown = '' if all(np.isfinite(one.rest_rms).all() for one in last.values()) else f'; {UNMEASURED}'
     return f"the slide is stored as the reference of the finger, '{path}'{unknown}"
 
@@ -110,10 +107,6 @@ def _faults(found: Mapping[str, InputComparison]) -> list[str]:
     return [f'{topic}: {fault}' for topic, one in found.items() for fault in one.faults]
 
 
-def _numbers_of(request: ExplorationRequest) -> dict[str, float]:
-    return {name: getattr(request, name) for name in SLIDE_NUMBERS}
-
-
 def _numbers_shown(slide: LabelledSlide) -> dict[str, float]:
     """Return the numbers of the request that would make a slide again, none if it was not straight."""
     made = slide.motion
@@ -132,17 +125,3 @@ def _numbers(found: Mapping[str, InputComparison]) -> str:
         + (f', noise × {one.noise_ratio:.1f}, drift {one.drift:.1f} rms' if one.rest_is_known else '')
         for topic, one in found.items()
     )
-
-
-def adapt_to_today(model: str | Path, bags: Sequence[str | Path], today: Sequence[str | Path]) -> tuple[Path, str]:
-    """Save MODEL-today, adapted by the labelled slides of today; return its path, and in a sentence what it is."""
-    trained = load_model(model)
-    features = trained.recipe.feature_set
-    shots = SlideDataset.from_bags(today, topics=features.topics)
-    examples = training_examples(trained.recipe, SlideDataset.from_bags(bags, topics=features.topics))
-    stem = model_stem(model)
-    out = stem.with_name(f'{stem.name}{DAY_SUFFIX}')
-    adapted(trained, examples, shots.features(features)).save(out)
-    missing = sorted(set(trained.trained_labels) - set(shots.labels.tolist()))
-    without = f'; without a slide of today: {", ".join(missing)}' if missing else ''
-    return out, f"'{out}' is adapted to {len(shots)} slides of today{without}; it names surfaces and rejects them all"

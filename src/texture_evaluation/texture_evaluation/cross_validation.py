@@ -54,18 +54,6 @@ def single_blas_thread() -> AbstractContextManager[Any]:
 
 
 @contextmanager
-def workers(jobs: int = -1, dask: str = '') -> Iterator[None]:
-    """Have joblib use this many cores (-1: all) within a `with` block, or the cluster whose address is given.
-
-    Threads, not processes: what takes the time (libsvm, products of arrays) lets go of Python's lock, and nothing is
-    copied.
-    """
-    spread = dask_backend(dask) if dask else parallel_config(backend='threading', n_jobs=jobs)
-    with single_blas_thread(), spread:
-        yield
-
-
-@contextmanager
 def dask_backend(address: str) -> Iterator[None]:
     """Have joblib use the workers of a Dask cluster, which have this suite installed, within a `with` block."""
     cluster_of = library('distributed', "Dask clusters ('--dask')", 'dask')
@@ -215,10 +203,6 @@ class ChronologicalSplit:
             raise InvalidParameter(f'train_size is {train_size}; a fraction above 0 and below 1 is needed')
         self.train_size = train_size
 
-    def get_n_splits(self, *_args: object, **_named: object) -> int:
-        """Return 1, whatever else scikit-learn's splitters take."""
-        return 1
-
     def split(  # X is there because scikit-learn's splitters have it
         self,
         X: object,
@@ -359,7 +343,8 @@ def compare(first: CrossValidation, second: CrossValidation) -> PairedComparison
     -----
     Sources: McNemar 1947, the exact form by the binomial distribution; Efron & Tibshirani 1993, chapter 13.
     """
-    slides = sorted(_tested(first) & _tested(second))
+    one, other = ({name for fold in result.folds for name in fold.results} for result in (first, second))
+    slides = sorted(one & other)
     if not slides:
         raise InvalidData(f"no slide was tested by '{first.recipe}' and by '{second.recipe}'; use the same split")
     right, windows = (
@@ -400,10 +385,6 @@ def mcnemar(only_first: int, only_second: int) -> float:
     """Return the exact two-sided p value of the McNemar (sign) test, 1 if the two never differ."""
     differing = only_first + only_second
     return float(binomtest(only_first, differing).pvalue) if differing else 1.0
-
-
-def _tested(result: CrossValidation) -> set[str]:
-    return {name for fold in result.folds for name in fold.results}
 
 
 def _counts(result: CrossValidation, slides: Sequence[str], *, of_windows: bool) -> Array:

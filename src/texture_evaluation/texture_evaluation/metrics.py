@@ -68,12 +68,6 @@ def unclassified_windows(results: Sequence[SlideResult]) -> float:
     return float(np.mean([not label for result in results for label in result.window_labels]))
 
 
-def unclassified_at_times(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
-    """Return the fraction of slides without a label after the usual times, keyed '0.5', '1.0' and so on."""
-    ends = {f'{seconds:.1f}': [result.after(seconds) for result in results] for seconds in TIMES_S}
-    return {key: _fraction([not end.label for end in reached if end is not None]) for key, reached in ends.items()}
-
-
 def early_decision(results: Sequence[SlideResult]) -> Mapping[str, float]:
     """Return accuracy and mean time of decisions taken as soon as the estimate is decided."""
     decisions = [(result.surface, result.early()) for result in results]
@@ -96,23 +90,6 @@ def calibration_error(results: Sequence[SlideResult]) -> float:
     bins = np.minimum((confidence * CALIBRATION_BINS).astype(int), CALIBRATION_BINS - 1)
     gaps = np.bincount(bins, confidence - right)  # sums: the weights of the bins are in them
     return float(np.abs(gaps).sum() / len(right))
-
-
-def candidates(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
-    """Return how often the true texture is among the candidates at the end, and how many these are on average."""
-    ends = [(result.surface, result.end.prediction_set) for result in results]
-    named = [(surface, names) for surface, names in ends if names]
-    if not named:
-        return {'coverage': None, 'mean_size': None}
-    return {
-        'coverage': float(np.mean([surface in names for surface, names in named])),
-        'mean_size': float(np.mean([len(names) for _, names in named])),
-    }
-
-
-def falsely_rejected(results: Sequence[SlideResult]) -> float | None:
-    """Return the fraction of slides over trained surfaces that were rejected at the end; None without any."""
-    return _fraction([not result.end.accepted for result in results])
 
 
 def unknown_accepted(results: Sequence[SlideResult]) -> float | None:

@@ -136,11 +136,8 @@ def one_against_rest(grades: Array) -> tuple[float, float]:
         errors.append(float(np.abs(grades_of_one[shared] - rest).mean()))
         if grades_of_one[shared].std() > 0 and rest.std() > 0:  # a rater with one grade for all has no correlation
             correlations.append(float(np.corrcoef(grades_of_one[shared], rest)[0, 1]))
-    return _mean(errors), _mean(correlations)
-
-
-def _mean(values: list[float]) -> float:
-    return float(np.mean(values)) if values else math.nan
+    error, correlation = (float(np.mean(found)) if found else math.nan for found in (errors, correlations))
+    return error, correlation
 
 
 # --------------------
@@ -214,17 +211,13 @@ def protocol_violations(ratings: Ratings) -> list[str]:
 
 
 def _uneven_raters(ratings: Ratings) -> Iterator[str]:
-    low, high = _allowed_a_grade(len(ratings.textures))
+    low, high = (number * len(ratings.textures) / PAPERS_TEXTURES for number in TEXTURES_PER_GRADE)
+    low, high = math.floor(low), math.ceil(high)
     for name, row in zip(ratings.raters, ratings.grades, strict=True):
         used = (np.rint(row)[:, None] == RATINGS_GRADES).sum(axis=0)
         if used.min() < low or used.max() > high:
             shown = ', '.join(f'{count} × {grade}' for grade, count in zip(RATINGS_GRADES, used, strict=True))
             yield f'rater {name} did not spread the textures evenly: {shown}; {low} to {high} a grade are required'
-
-
-def _allowed_a_grade(n_textures: int) -> tuple[int, int]:
-    low, high = (number * n_textures / PAPERS_TEXTURES for number in TEXTURES_PER_GRADE)
-    return math.floor(low), math.ceil(high)
 
 
 def _or_none(value: float) -> float | None:

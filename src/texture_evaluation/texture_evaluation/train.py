@@ -85,7 +85,7 @@ def train_grades_from_bags(
 
 def training_examples(recipe: Recipe, dataset: SlideDataset) -> LabelledFeatures:
     """Return the windows of labelled slides as the training of a recipe needs them, with its augmentation."""
-    windows = replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
+    windows = replace(recipe.feature_set, windows=recipe.training_windows)
     distances_m = recipe.training.distances_m(recipe.feature_set.windows.length_s)
     return dataset.features(windows, recipe.augmentation, distances_m)
 

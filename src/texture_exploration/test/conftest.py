@@ -3,21 +3,23 @@
 """A table to explore on: time, arm and surface stepped by hand, so that every run is the same."""
 
 import importlib.util
+import sys
 import threading
+from pathlib import Path
 
-import numpy as np
 import pytest
 
 from texture_core.types import ExplorationRequest
-from texture_exploration.arms.ros_controllers import RosControllersArm
 from texture_exploration.arms.simulated import PLANE, SimulatedArm, SimulatedArmParams
-from texture_exploration.arms.tool_state import ForceSample, PoseSample, RosControllersParams
 from texture_exploration.exploration import Exploration, no_signal_watch
 from texture_exploration.explorer import Explorer
 from texture_exploration.motions import MOTIONS
 from texture_exploration.safety import SafetyLimits
 from texture_exploration.touch import TouchParams
-from texture_simulation.devices.twist_controller import TOOL_DOWN, EmulatedTwistArm, TwistControllerParams
+from texture_simulation.devices.twist_controller import TwistControllerParams
+
+sys.path.append(str(Path(__file__).parent))  # where tests find the robot
+from twist_robot import Robot
 
 # The pure tests run where there is no ROS.
 ROS_TESTS = [
@@ -49,6 +51,8 @@ class Table:
         self.late_ns = 0  # delay of the states of the arm
         self.signal_fault = no_signal_watch
         self.when = {}  # what to do at the third state of a phase
+        self.at_each_step = lambda: None
+        self.pressed = []  # time, ns, and true force, N, of each step
 
     def sleep(self):
         """Let the whole machine sleep: time goes on, arm and exploration do not."""
@@ -57,10 +61,17 @@ class Table:
     def pace(self):
         if self.asleep_ns:
             self.now_ns, self.asleep_ns = self.now_ns + self.asleep_ns, 0
-            return
-        for _ in range(2):
-            self.now_ns += ARM_STEP_NS
-            self.arm.step(ARM_STEP_NS * 1e-9)
+        else:
+            for _ in range(2):
+                self.now_ns += ARM_STEP_NS
+                self.arm.step(ARM_STEP_NS * 1e-9)
+        self.pressed.append((self.now_ns, self.arm.true_force_n))
+        self.at_each_step()
+
+    @property
+    def largest_n(self):
+        """The largest true force."""
+        return max(force_n for _, force_n in self.pressed)
 
     def explore(self, request=LINEAR):
         motion = MOTIONS[request.motion](request, self.home, self.touch, self.limits)
@@ -94,81 +105,13 @@ class Table:
         return self.states[at], self.places[at]
 
 
-class LateRobot:
-    """An emulated arm at the other end of its topics, whose force sensor is not zeroed; both stepped by hand."""
-
-    def __init__(self, emulated, touch=TOUCH, limits=LIMITS, **given):
-        self.now_ns = 1_000_000_000
-        self.machine = EmulatedTwistArm(emulated, self.now_ns)
-        self.touch, self.limits = touch, limits
-        self.sent, self.pressed_n, self.phases = [], [], []
-        params = RosControllersParams(**given)
-        self.arm = RosControllersArm(params, lambda: self.now_ns, lambda _params: self, own_thread=False)
-        self.arm.connect()
-        for _ in range(30):  # a connection begins at rest
-            self.pace()
-
-    def newest_pose(self):
-        return PoseSample(self.now_ns, 'base', tuple(self.machine.position.tolist()), TOOL_DOWN)
-
-    def newest_force(self):
-        return ForceSample(self.now_ns, 'tool0_controller', tuple(self.machine.reading_n().tolist()))
-
-    def listeners(self):
-        return 1
-
-    def unsafe(self):
-        return ''
-
-    def beat(self, *, moving):
-        pass
-
-    def send_velocity(self, velocity_m_s):
-        self.sent.append((self.now_ns, velocity_m_s))
-        self.machine.command(self.now_ns, np.array(velocity_m_s))
-
-    def send_force(self, force_n):
-        pass
-
-    def close(self):
-        pass
-
-    def pace(self):
-        for _ in range(2):
-            self.now_ns += ARM_STEP_NS
-            self.machine.advance(self.now_ns)
-            self.pressed_n.append(float(np.linalg.norm(self.machine.force_n)))
-            self.arm.step()
-
-    def explore(self, request, on_state=lambda state: None):
-        plan = MOTIONS[request.motion](request, self.arm.state().position, self.touch, self.limits)
-
-        def note(state):
-            self.phases.append(state.phase)
-            on_state(state)
-
-        self.exploration = Exploration(
-            'one',
-            request,
-            arm=self.arm,
-            motion=plan.lift_first(lambda: self.arm.zeroed),
-            limits=self.limits,
-            clock=lambda: self.now_ns,
-            on_state=note,
-        )
-        outcome = self.exploration.run(self.pace)
-        for _ in range(50):
-            self.pace()
-        return outcome
-
-
 @pytest.fixture
 def make_robot():
-    """Return a function that makes an arm behind emulated ROS controllers."""
+    """Return a function that makes a connected arm behind an emulated velocity controller."""
 
     def make(emulated=None, **given):
         emulated = {'start_height_m': 0.003, 'force_noise_n': 0.002, 'jitter_s': 0.0, **(emulated or {})}
-        return LateRobot(TwistControllerParams(**emulated), **given)
+        return Robot(TwistControllerParams(**emulated), **given).connect()
 
     return make
 

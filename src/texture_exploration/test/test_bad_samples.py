@@ -10,6 +10,7 @@ import pytest
 
 from texture_core.errors import ExplorationError
 from texture_core.types import ExplorationRequest, Phase
+from texture_exploration.paths import PathFollower
 from texture_exploration.safety import SafetyLimits
 
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.02, force_n=1.0, distance_m=0.03)
@@ -117,6 +118,16 @@ def test_an_error_of_the_program_commands_zero_lifts_the_finger_and_says_so(tabl
     assert outcome.lifted
     assert table.arm.true_force_n == 0.0
     assert table.phases[-1] is Phase.ABORTED
+
+
+@pytest.mark.parametrize('phase', [Phase.CONTACT, Phase.SLIDE])
+def test_a_command_that_the_arm_refuses_is_named_and_the_finger_is_lifted(table, monkeypatch, phase):
+    table.when[phase] = lambda: monkeypatch.setattr(PathFollower, 'velocity', lambda *_: (math.nan, 0.0))
+    outcome = table.explore()
+    assert outcome.error is ExplorationError.ARM_FAULT
+    assert 'the command was refused and the arm stopped: the speed along the surface is nan' in outcome.message
+    assert outcome.lifted
+    assert table.arm.true_force_n == 0.0
 
 
 def test_an_error_in_the_thread_of_the_arm_commands_zero_is_named_and_the_finger_lifted(make_robot):

@@ -25,6 +25,8 @@ def test_a_stop_in_any_phase_lifts_the_finger_and_says_aborted(table, phase):
     assert table.phases[-2:] == [Phase.LIFT, Phase.ABORTED]
     assert table.arm.state().force_n == 0
     assert table.arm.state().position[2] == pytest.approx(table.home[2], abs=0.001)
+    if phase is Phase.SLIDE:  # it leaves along the normal: 0.05 m/s until the third state
+        assert table.arm.state().position[0] - table.first(Phase.SLIDE)[1][0] < 0.004
 
 
 def test_a_lift_that_fails_after_a_stop_is_reported_with_the_stop(table, monkeypatch):
@@ -39,6 +41,14 @@ def test_a_lift_that_fails_after_a_stop_is_reported_with_the_stop(table, monkeyp
     assert table.phases[-2:] == [Phase.LIFT, Phase.ABORTED]
 
 
+def test_an_exploration_that_takes_longer_than_its_timeout_is_aborted_and_lifts(table):
+    outcome = table.explore(ExplorationRequest('linear_slide', speed_m_s=0.01, timeout_s=2.0))
+    assert outcome.error is ExplorationError.TIMEOUT
+    assert outcome.message == 'the exploration took longer than its timeout of 2 s'
+    assert table.phases[-2:] == [Phase.LIFT, Phase.ABORTED]
+    assert table.arm.state().force_n == 0
+
+
 def test_an_arm_that_hangs_in_the_lift_after_a_stop_is_reported_with_the_stop(table):
     table.when[Phase.SLIDE] = lambda: table.exploration.stop('stopped on request')
     table.when[Phase.LIFT] = table.arm.freeze
@@ -46,13 +56,6 @@ def test_an_arm_that_hangs_in_the_lift_after_a_stop_is_reported_with_the_stop(ta
     assert re.match(
         r'stopped on request; .*has not answered for 1[34]\d ms; the finger was not lifted', outcome.message
     )
-
-
-def test_a_stop_while_sliding_leaves_along_the_normal(table):
-    table.when[Phase.SLIDE] = lambda: table.exploration.stop('stopped on request')
-    table.explore()
-    begin, end = table.first(Phase.SLIDE)[1], table.arm.state().position
-    assert end[0] - begin[0] < 0.004  # 0.05 m/s until the third state
 
 
 def test_without_a_surface_the_approach_gives_up(make_table):
@@ -88,29 +91,18 @@ def test_a_machine_that_slept_does_not_take_the_arm_for_dead(table):
     assert table.exploration.gaps == 1
 
 
-def late_every(table, steps):
-    """Make every such step of the loop late by 60 ms, as on a busy machine."""
-    in_time, steps_done = table.pace, []
-
-    def pace():
-        steps_done.append(0)
-        if len(steps_done) % steps == 0:
+@pytest.mark.parametrize('silent', ['arm', 'sensor'])
+def test_steps_that_are_late_again_and_again_hide_neither_an_arm_that_hangs_nor_a_silent_sensor(table, silent):
+    def be_late():  # every eighth step is late by 60 ms, as on a busy machine
+        if len(table.pressed) % 8 == 7:
             table.asleep_ns = 60_000_000
-        in_time()
 
-    table.pace = pace
-
-
-def test_steps_that_are_late_again_and_again_do_not_hide_an_arm_that_hangs(table):
-    late_every(table, 8)
-    table.when[Phase.SLIDE] = table.arm.freeze
-    assert 'has not answered for' in table.explore().message
-
-
-def test_steps_that_are_late_again_and_again_do_not_hide_a_sensor_that_is_silent(table):
-    late_every(table, 8)
-    table.signal_fault = SignalWatch(0.5, lambda: table.now_ns).signal_fault
-    assert table.explore().message.startswith("no samples on 'signal'")
+    table.at_each_step = be_late
+    if silent == 'arm':
+        table.when[Phase.SLIDE] = table.arm.freeze
+    else:
+        table.signal_fault = SignalWatch(0.5, lambda: table.now_ns).signal_fault
+    assert {'arm': 'has not answered for', 'sensor': "no samples on 'signal'"}[silent] in table.explore().message
 
 
 def test_a_slide_that_was_over_before_it_was_seen_is_no_success(table):
@@ -167,14 +159,7 @@ def test_a_sensor_that_falls_silent_lifts_the_finger_within_150_ms(table, phase)
     table.signal_fault, hear = watch.signal_fault, watch.on_samples
     fell_silent = []
 
-    go_on = table.pace
-
-    def pace():
-        if not fell_silent:
-            hear()
-        go_on()
-
-    table.pace = pace
+    table.at_each_step = lambda: fell_silent or hear()
     table.when[phase] = lambda: fell_silent.append(table.now_ns)
     outcome = table.explore()
     assert re.fullmatch(r"no samples on 'signal' for 1[23]\d ms; check the sensor and its node", outcome.message)
@@ -184,51 +169,32 @@ def test_a_sensor_that_falls_silent_lifts_the_finger_within_150_ms(table, phase)
         assert (lifted_ns - fell_silent[0]) * 1e-9 == pytest.approx(0.12, abs=0.02)
 
 
-def watch_with_heights(table, first_sample_s):
-    """Let samples come from a time after the start on; return the times, s, and the heights above the start, m."""
+@pytest.mark.parametrize(
+    ('first_sample_s', 'stop_s', 'message'),
+    [
+        (0.3, math.inf, 'the motion was completed'),
+        (math.inf, math.inf, "no samples on 'signal' for 5"),
+        (math.inf, 0.1, 'stopped on request'),
+    ],
+    ids=['a late one', 'none', 'none, and a stop'],
+)
+def test_the_finger_rests_until_the_first_sample(table, first_sample_s, stop_s, message):
     watch = SignalWatch(0.5, lambda: table.now_ns)
     table.signal_fault = watch.signal_fault
-    start_ns, go_on, seen = table.now_ns, table.pace, []
+    start_ns, seen = table.now_ns, []
 
-    def pace():
+    def look():
         time_s = (table.now_ns - start_ns) * 1e-9
         if time_s >= first_sample_s:
             watch.on_samples()
         seen.append((time_s, table.arm.state().position[2] - table.home[2]))
-        go_on()
-
-    table.pace = pace
-    return seen
-
-
-def test_the_finger_rests_until_the_first_sample_and_then_explores(table):
-    seen = watch_with_heights(table, first_sample_s=0.3)
-    assert table.explore().success
-    assert {height for time_s, height in seen if time_s <= 0.3} == {0.0}
-    assert min(height for _, height in seen) < -0.001
-
-
-def test_without_a_sample_the_finger_is_never_lowered(table):
-    seen = watch_with_heights(table, first_sample_s=math.inf)
-    outcome = table.explore()
-    assert outcome.message.startswith("no samples on 'signal' for 5")
-    assert seen[-1][0] >= 0.5
-    assert min(height for _, height in seen) == 0.0
-    assert Phase.APPROACH not in table.phases
-
-
-def test_a_stop_ends_the_wait_for_the_first_sample(table):
-    seen = watch_with_heights(table, first_sample_s=math.inf)
-    go_on = table.pace
-
-    def pace():
-        go_on()
-        if seen[-1][0] >= 0.1:
+        if time_s >= stop_s:
             table.exploration.stop('stopped on request')
 
-    table.pace = pace
-    assert table.explore().message == 'stopped on request'
-    assert min(height for _, height in seen) == 0.0
+    table.at_each_step = look
+    assert table.explore().message.startswith(message)
+    assert min(height for time_s, height in seen if time_s <= first_sample_s) == 0.0
+    assert (Phase.APPROACH in table.phases) is math.isfinite(first_sample_s)
 
 
 def test_a_machine_that_slept_does_not_take_the_sensor_for_silent(table):
@@ -248,14 +214,11 @@ def test_a_machine_that_slept_does_not_take_the_sensor_for_silent(table):
 # the expected sentence.
 FORCE, FAULT = ExplorationError.FORCE_LIMIT, ExplorationError.ARM_FAULT
 HAPPENINGS = {
-    'a stop': (lambda table: table.exploration.stop('enough'), 0.02, ExplorationError.STOPPED, 'enough'),
     'a force above the limit': (lambda table: table.arm.push(20.0), 0.02, FORCE, 'is above the limit of 10 N'),
     'a shove out of the workspace': (
         lambda table: table.arm.displace((0.3, 0.0, 0.0)), 0.02, ExplorationError.WORKSPACE, 'left the workspace: x is',
     ),
-    'an arm that hangs': (
-        lambda table: table.arm.freeze(), 0.15, FAULT, r'not answered for 1[34]\d ms; the finger was not lifted',
-    ),
+    'an arm that hangs': (lambda table: table.arm.freeze(), 0.15, FAULT, 'has not answered for'),
     'an arm in a protective stop': (
         lambda table: table.arm.fail('protective stop'), 0.02, FAULT, 'the arm reports a fault: protective stop',
     ),
@@ -266,17 +229,12 @@ HAPPENINGS = {
 def test_whatever_ends_a_slide_ends_it_within_100_ms_and_the_next_exploration_works(name, table, record_property):
     happens, soon_s, error, expected = HAPPENINGS[name]
     happened, moved = [], []
-    go_on = table.pace
-
-    def pace():
-        go_on()
-        moved.append((table.now_ns, any(table.arm.state().velocity[:2])))
 
     def now():
         happened.append(table.now_ns)
         happens(table)
 
-    table.pace = pace
+    table.at_each_step = lambda: moved.append((table.now_ns, any(table.arm.state().velocity[:2])))
     table.when[Phase.SLIDE] = now
     outcome = table.explore()
     assert (outcome.success, outcome.error) == (False, error)
@@ -299,13 +257,8 @@ def test_a_wall_in_the_path_ends_the_slide_and_the_finger_goes_back_before_it_is
     make_table, speed_m_s, force_mode
 ):
     table = make_table(SimulatedArmParams(force_mode=force_mode), shape=SurfaceShape(wall_m=0.02))
-    held, go_on = [], table.pace
-
-    def pace():
-        go_on()
-        held.append(table.arm.state().force_size_n)
-
-    table.pace = pace
+    held = []
+    table.at_each_step = lambda: held.append(table.arm.state().force_size_n)
     outcome = table.explore(ExplorationRequest('linear_slide', speed_m_s=speed_m_s, force_n=1.0, distance_m=0.06))
     print(f'{max(held):.1f} N: {outcome}')
     assert (outcome.success, outcome.lifted) == (False, True)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from texture_core.errors import DeviceError, ExplorationError, MotionRefused, UnknownName
+from texture_core.errors import DeviceError, ExplorationError, MotionRefused
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.simulated import SimulatedArm
 from texture_exploration.arms.ur import UrArm
@@ -31,11 +31,6 @@ def test_a_second_exploration_at_once_is_refused(explorer):
     with pytest.raises(MotionRefused, match="'one' is still running"):
         explorer.begin('two', QUICK)
     assert explorer.counts['refused'] == 1
-
-
-def test_an_unknown_motion_is_refused_with_the_nearest_name(explorer):
-    with pytest.raises(UnknownName, match="did you mean 'linear_slide'"):
-        explorer.begin('one', ExplorationRequest('linear_slid'))
 
 
 def test_a_fault_in_a_users_planner_is_told_with_its_file_and_line(explorer, tmp_path, monkeypatch):
@@ -93,27 +88,23 @@ def test_an_arm_that_failed_is_connected_again_by_the_next_request(explorer):
     assert exploration.outcome.success, exploration.outcome.message
 
 
-def test_recovering_frees_a_failed_arm_but_not_in_the_middle_of_an_exploration(explorer):
+class Wise(SimulatedArm):
+    def recover(self):
+        self.recovered = True
+        self.connect()
+
+
+@pytest.mark.parametrize('arm_class', [SimulatedArm, Wise], ids=['by a new connection', 'in its own way'])
+def test_recovering_frees_a_failed_arm_but_not_in_the_middle_of_an_exploration(explorer, arm_class):
+    explorer.arm.__class__ = arm_class
     explorer.arm.fail('protective stop')
     explorer.recover()
     assert explorer.fault() == ''
+    assert hasattr(explorer.arm, 'recovered') is (arm_class is Wise)
     explorer.table.gate.clear()
     explorer.begin('one', SLOW)
     with pytest.raises(MotionRefused, match="'one' is still running"):
         explorer.recover()
-
-
-def test_an_arm_recovers_in_its_own_way_if_it_knows_one(explorer):
-    class Wise(SimulatedArm):
-        def recover(self):
-            self.recovered = True
-            self.connect()
-
-    explorer.arm.__class__ = Wise
-    explorer.arm.fail('protective stop')
-    explorer.recover()
-    assert explorer.arm.recovered
-    assert explorer.fault() == ''
 
 
 def test_closing_while_it_moves_lifts_the_finger_and_ends_the_thread(explorer, monkeypatch):
@@ -145,9 +136,6 @@ def test_an_arm_that_cannot_be_reached_refuses_in_a_sentence():
     with pytest.raises(MotionRefused, match='the arm is not ready: the arm does not answer'):
         explorer.begin('one', QUICK)
     assert explorer.fault() == 'not connected'
-
-
-def test_an_arm_that_is_not_connected_counts_nothing_and_ends_nothing():
     assert Explorer(UrArm(), TouchParams(), SafetyLimits(), lambda state: None).arm_counts() == {}
 
 

@@ -204,28 +204,19 @@ LONG = {'motion': 'linear_slide', 'speed_m_s': 0.05, 'distance_m': 0.15}
 LONG_RUB = {'motion': 'in_hand_sliding', 'speed_m_s': 0.02, 'duration_s': 20.0}
 
 
-def rails_parameters(device):
-    return {'device': str(device.port.link), 'height_m': HEIGHT_M}
-
-
-def hand_parameters(bus):
-    return {'hand': 'dynamixel', 'device': str(bus.port.link), 'grip_timeout_s': 20.0}
-
-
-def rails_place(device):
-    return device.firmware.position[0]
-
-
-def hand_place(bus):
-    return bus.motors.angle_rad(0)
-
-
 # Robot, module it needs, its parameters, a long slide, where the finger is, how far it goes before the explorer is
 # killed, and how long it may still move: the rails' watchdog waits for 0.15 s, a motor goes to its last goal.
 KILLINGS = {
-    'rails': (rails, 'serial', rails_parameters, LONG, rails_place, 0.01, 0.2),
-    'hand': (hand, 'dynamixel_sdk', hand_parameters, LONG_RUB, hand_place, 0.03, 0.15),
-}
+    'rails': (
+        rails, 'serial', lambda device: {'device': str(device.port.link), 'height_m': HEIGHT_M}, LONG,
+        lambda device: device.firmware.position[0], 0.01, 0.2,
+    ),
+    'hand': (
+        hand, 'dynamixel_sdk',
+        lambda bus: {'hand': 'dynamixel', 'device': str(bus.port.link), 'grip_timeout_s': 20.0}, LONG_RUB,
+        lambda bus: bus.motors.angle_rad(0), 0.03, 0.15,
+    ),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize('name', KILLINGS)

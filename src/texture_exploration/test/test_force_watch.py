@@ -19,23 +19,12 @@ TILT = 0.005  # a steeper slope is no success with one gain for the stiffest con
 
 
 def explore(make_table, arm, happens, phase, *, request=REQUEST, tilt_rad=0.0):
-    """Explore while something happens in a phase; return the table, the outcome, when it was, and the peak force."""
+    """Explore while something happens in a phase; return the table, the outcome, and when it was."""
     touch = TouchParams(approach_stiffness_n_m=arm.max_stiffness_n_m)
     table = make_table(arm, touch, shape=SurfaceShape(tilt_rad=tilt_rad))
-    happened, peak, go_on = [], [0.0], table.pace
-
-    def pace():
-        go_on()
-        peak[0] = max(peak[0], table.arm.true_force_n)
-
-    def now():
-        happened.append(table.now_ns)
-        happens(table.arm)
-
-    table.pace = pace
-    table.when[phase] = now
-    outcome = table.explore(request)
-    return table, outcome, happened[0], peak[0]
+    happened = []
+    table.when[phase] = lambda: (happened.append(table.now_ns), happens(table.arm))
+    return table, table.explore(request), happened[0]
 
 
 def lifted_ns(table):
@@ -49,11 +38,11 @@ def lifted_ns(table):
 def test_a_frozen_force_is_noticed_within_100_ms_and_the_finger_is_lifted(make_table, phase, stiffness, tilt_rad):
     arm = replace(ARM, stiffness_n_m=stiffness, max_stiffness_n_m=stiffness)
     freeze = SimulatedArm.freeze_force
-    table, outcome, frozen_ns, peak_n = explore(make_table, arm, freeze, phase, tilt_rad=tilt_rad)
+    table, outcome, frozen_ns = explore(make_table, arm, freeze, phase, tilt_rad=tilt_rad)
     assert not outcome.success
     assert outcome.message.startswith('the measured force is frozen: it has been')
     assert (lifted_ns(table) - frozen_ns) * 1e-9 <= 0.1
-    assert peak_n < 6.0
+    assert table.largest_n < 6.0
     assert table.arm.true_force_n == 0.0
 
 
@@ -61,10 +50,10 @@ def test_a_frozen_force_is_noticed_within_100_ms_and_the_finger_is_lifted(make_t
 @pytest.mark.parametrize('stiffness', [200.0, 2000.0, 20000.0])
 def test_a_force_that_freezes_far_from_the_wanted_one_is_noticed_without_noise_too(make_table, stiffness, noise_n):
     arm = replace(ARM, stiffness_n_m=stiffness, max_stiffness_n_m=stiffness, force_noise_n=noise_n)
-    table, outcome, frozen_ns, peak_n = explore(make_table, arm, SimulatedArm.freeze_force, Phase.CONTACT)
+    table, outcome, frozen_ns = explore(make_table, arm, SimulatedArm.freeze_force, Phase.CONTACT)
     assert outcome.message.startswith('the measured force is frozen')
     assert (lifted_ns(table) - frozen_ns) * 1e-9 <= 0.25  # it stands at first, which proves nothing without noise
-    assert peak_n < 6.0
+    assert table.largest_n < 6.0
 
 
 @pytest.mark.parametrize('force_mode', [True, False])
@@ -81,24 +70,24 @@ def test_an_arm_without_noise_whose_force_stays_the_same_is_believed(make_table,
 @pytest.mark.parametrize('rate_n_s', [-0.5, 0.5, 2.0])
 def test_a_force_that_drifts_over_the_slide_is_no_success(make_table, rate_n_s, force_mode):
     arm = replace(ARM, force_mode=force_mode)
-    _, outcome, _, peak_n = explore(
+    table, outcome, _ = explore(
         make_table, arm, lambda arm: arm.drift_force(rate_n_s), Phase.SLIDE, request=replace(REQUEST, distance_m=0.1)
     )
     assert not outcome.success
     assert outcome.message.startswith(
         ('the force in free air was', 'the contact with the surface was lost', 'the mean force of the slide was')
     )
-    assert peak_n < 3.0
+    assert table.largest_n < 3.0
 
 
 @pytest.mark.parametrize('rate_n_s', [0.3, 1.0])
 def test_a_force_that_drifts_up_in_free_air_is_not_taken_for_a_slide(make_table, rate_n_s):
-    _, outcome, _, _ = explore(make_table, ARM, lambda arm: arm.drift_force(rate_n_s), Phase.APPROACH)
+    _, outcome, _ = explore(make_table, ARM, lambda arm: arm.drift_force(rate_n_s), Phase.APPROACH)
     assert not outcome.success
 
 
 def test_a_small_drift_is_allowed(make_table):
-    _, outcome, _, _ = explore(make_table, ARM, lambda arm: arm.drift_force(0.05), Phase.SLIDE)
+    _, outcome, _ = explore(make_table, ARM, lambda arm: arm.drift_force(0.05), Phase.SLIDE)
     assert outcome.success, outcome.message
 
 

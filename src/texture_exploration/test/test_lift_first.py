@@ -130,19 +130,11 @@ def lifts_first(explorer):
     return max(heights) > 0.002 + 0.8 * TOUCH.clearance_m
 
 
-def test_after_connecting_the_first_exploration_lifts_first_and_the_second_does_not(explorer):
+def test_the_first_exploration_lifts_first_and_so_does_one_after_a_fault_or_an_abort(explorer):
     assert [lifts_first(explorer), lifts_first(explorer)] == [True, False]
-
-
-def test_after_a_fault_and_a_recovery_the_exploration_lifts_first(explorer):
-    lifts_first(explorer)
     explorer.arm.fail('protective stop')
     explorer.recover()
-    assert lifts_first(explorer)
-
-
-def test_after_an_exploration_that_was_aborted_the_next_one_lifts_first(explorer):
-    lifts_first(explorer)
+    assert [lifts_first(explorer), lifts_first(explorer)] == [True, False]
     explorer.table.gate.clear()
     exploration = explorer.begin('two', REQUEST)
     explorer.stop('enough')

@@ -12,12 +12,8 @@ from texture_core.errors import ExplorationError, MotionRefused
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.arm import ArmState
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
-from texture_exploration.motions import (
-    DEFAULTS,
-    MOTIONS,
-    cross_slide,
-)
-from texture_exploration.paths import CircularPath, PathFollower, StraightPath, ramp_s, ramps_m, random_strokes, smooth
+from texture_exploration.motions import DEFAULTS, MOTIONS
+from texture_exploration.paths import CircularPath, PathFollower, StraightPath, StrokeEnds, ramp_s, ramps_m, smooth
 from texture_exploration.safety import SafetyLimits
 from texture_exploration.touch import TouchParams
 
@@ -30,20 +26,15 @@ def sliding(table):
 
 
 @pytest.mark.parametrize('name', MOTIONS)
-def test_a_motion_with_all_defaults_slides_and_ends_lifted(table, name):
-    assert table.explore(ExplorationRequest(name)).success
-    assert table.phases == ORDER
-    assert table.arm.state().force_n == 0
-
-
-@pytest.mark.parametrize('name', MOTIONS)
 def test_a_motion_takes_the_numbers_that_it_says_it_takes(table, name):
     assert table.explore(ExplorationRequest(name, **DEFAULTS[name])).success
 
 
 @pytest.mark.parametrize('name', MOTIONS)
-def test_the_finger_keeps_its_speed_and_its_direction_is_where_it_goes(table, name):
-    table.explore(ExplorationRequest(name))
+def test_a_motion_with_all_defaults_keeps_its_speed_goes_in_its_direction_and_ends_lifted(table, name):
+    assert table.explore(ExplorationRequest(name)).success
+    assert table.phases == ORDER
+    assert table.arm.state().force_n == 0
     steps = [(a, b, (b[0].stamp_ns - a[0].stamp_ns) * 1e-9) for a, b in pairwise(sliding(table))]
     guaranteed = [step for step in steps if step[2] <= step[0][0].steady_s]
     assert len(guaranteed) > 0.7 * len(steps)
@@ -66,25 +57,18 @@ def test_a_motion_that_is_aborted_in_the_approach_only_lifts(table, name):
 # Linear slides.
 
 
-def slide_of(table):
-    """Return the duration and the length of the slide."""
+@pytest.mark.parametrize(
+    ('speed', 'force', 'distance'), [(0.02, 1.0, 0.02), (0.05, 0.5, 0.1), (0.1, 1.0, 0.08), (0.1, 2.5, 0.1)]
+)
+def test_the_slide_has_the_length_the_speed_and_the_force_that_were_asked(table, speed, force, distance):
+    table.explore(ExplorationRequest('linear_slide', speed_m_s=speed, force_n=force, distance_m=distance))
     (begin, start), (end, stop) = table.first(Phase.SLIDE), table.first(Phase.LIFT)
-    return (end.stamp_ns - begin.stamp_ns) * 1e-9, math.dist(start[:2], stop[:2])
-
-
-@pytest.mark.parametrize(('speed', 'distance'), [(0.02, 0.02), (0.05, 0.1), (0.1, 0.08)])
-def test_the_slide_has_the_length_and_the_speed_that_were_asked(table, speed, distance):
-    table.explore(ExplorationRequest('linear_slide', speed_m_s=speed, distance_m=distance))
-    duration, length = slide_of(table)
+    length, duration = math.dist(start[:2], stop[:2]), (end.stamp_ns - begin.stamp_ns) * 1e-9
     assert length == pytest.approx(distance, abs=0.001)
     assert length / duration == pytest.approx(speed, rel=0.02)
-
-
-def test_while_sliding_speed_and_force_are_those_that_were_asked(table):
-    table.explore(ExplorationRequest('linear_slide', speed_m_s=0.1, force_n=2.5))
-    sliding = [state for state in table.states if state.phase is Phase.SLIDE]
-    assert [state.speed_m_s for state in sliding] == pytest.approx([0.1] * len(sliding), rel=0.02)
-    assert [state.force_n for state in sliding] == pytest.approx([2.5] * len(sliding), rel=0.1)
+    states = [state for state, _ in sliding(table)]
+    assert [state.speed_m_s for state in states] == pytest.approx([speed] * len(states), rel=0.02)
+    assert [state.force_n for state in states] == pytest.approx([force] * len(states), rel=0.1)
 
 
 def test_the_finger_goes_where_it_was_pointed(table):
@@ -135,9 +119,9 @@ REFUSED = [
     ('linear_slide', {'direction_rad': math.inf}, INVALID, 'direction_rad is inf'),
     ('linear_slide', {'distance_m': math.nan}, INVALID, 'distance_m is nan'),
     ('linear_slide', {'radius_m': 0.02, 'turns': 2.0}, UNUSED, 'does not use radius_m and turns; leave it at 0'),
-    ('linear_slide', {'distance_m': 0.9}, OUTSIDE, 'distance_m is 0.9, which'),
+    ('linear_slide', {'distance_m': 2.0}, INVALID, 'distance_m is 2; allowed is 0.002 to 1 m'),
     # 0.2 m of room, less the ramp of 0.1 s and the steady 0.05 s at 0.05 m/s.
-    ('linear_slide', {'distance_m': 2.0, 'speed_m_s': 0.05}, OUTSIDE, "0.192 m from x 0.000 and y 0.000 m, as 'x_high"),
+    ('linear_slide', {'distance_m': 0.9, 'speed_m_s': 0.05}, OUTSIDE, "0.192 m from x 0.000 and y 0.000 m, as 'x_high"),
     ('linear_slide', {'distance_m': 0.195, 'speed_m_s': 0.05, 'direction_rad': math.pi}, OUTSIDE, 'at most 0.192 m'),
     ('circular', {'radius_m': 0.5}, INVALID, 'circular: radius_m is 0.5; allowed is 0.005 to 0.1 m'),
     ('circular', {'distance_m': 0.1}, UNUSED, 'circular does not use distance_m; leave it at 0'),
@@ -283,37 +267,14 @@ def test_the_corner_exceeds_no_acceleration_and_keeps_the_speed(table):
 
 
 @pytest.mark.parametrize('heading', [0.0, 0.5, math.pi])
-def test_legs_that_leave_the_workspace_are_refused_with_the_longest_that_do_not(heading):
-    home = (0.1, 0.1, 0.01)
-    request = ExplorationRequest('cross_slide', distance_m=0.4, direction_rad=heading)
+def test_legs_that_leave_the_workspace_are_refused_with_the_longest_that_do_not(make_table, heading):
+    table = make_table(limits=SafetyLimits(x_low_m=-0.07, x_high_m=0.06, y_low_m=-0.05, y_high_m=0.08))
     with pytest.raises(MotionRefused, match='the length of each of two legs') as refused:
-        cross_slide(request, home, TouchParams(), SafetyLimits())
+        table.explore(ExplorationRequest('cross_slide', distance_m=0.4, direction_rad=heading))
     allowed = float(str(refused.value).partition('is at most ')[2].split()[0])
-    assert 0.0 < allowed < 0.3
-    fitting = ExplorationRequest('cross_slide', distance_m=allowed, direction_rad=heading)
-    cross_slide(fitting, home, TouchParams(), SafetyLimits())
-
-
-def test_the_longest_legs_stay_within_the_workspace(make_table):
-    table = make_table(limits=SafetyLimits(x_high_m=0.06, y_high_m=0.06))
-    with pytest.raises(MotionRefused) as refused:
-        cross_slide(ExplorationRequest('cross_slide', distance_m=0.2), table.home, TouchParams(), table.limits)
-    allowed = float(str(refused.value).partition('is at most ')[2].split()[0])
-    assert table.explore(ExplorationRequest('cross_slide', distance_m=allowed)).success
-
-
-@pytest.mark.parametrize('direction', [0.0, 0.5 * math.pi], ids=['first leg', 'second leg'])
-def test_a_stop_on_either_leg_lifts_and_aborts(table, direction):
-    def stop_on(state):
-        if state.phase is Phase.SLIDE and state.steady_s > 0 and abs(state.direction_rad - direction) < 0.01:
-            table.exploration.stop('enough')
-
-    keep = table.on_state
-    table.on_state = lambda state: (keep(state), stop_on(state))
-    outcome = table.explore(CROSS)
-    assert not outcome.success and outcome.message == 'enough'
-    assert table.phases[-2:] == [Phase.LIFT, Phase.ABORTED]
-    assert table.arm.state().force_n == 0
+    assert table.explore(ExplorationRequest('cross_slide', distance_m=allowed, direction_rad=heading)).success
+    with pytest.raises(MotionRefused):
+        table.explore(ExplorationRequest('cross_slide', distance_m=allowed + 0.001, direction_rad=heading))
 
 
 # --------------------
@@ -342,13 +303,8 @@ def test_nothing_is_guaranteed_for_a_turn(table):
 
 def guaranteed_speeds(table, request):
     """Explore, and return the true speeds at all times for which a steady one was guaranteed, m/s."""
-    speeds, pace = [], table.pace
-
-    def watched():
-        pace()
-        speeds.append((table.now_ns, math.hypot(*table.arm.state().velocity[:2])))
-
-    table.pace = watched
+    speeds = []
+    table.at_each_step = lambda: speeds.append((table.now_ns, math.hypot(*table.arm.state().velocity[:2])))
     assert table.explore(request).success
     guaranteed = [(s.stamp_ns, s.stamp_ns + s.steady_s * 1e9) for s, _ in sliding(table)]
     return [speed for stamp, speed in speeds if any(begin <= stamp < end for begin, end in guaranteed)]
@@ -371,18 +327,12 @@ def test_no_turn_exceeds_the_acceleration(table):
     assert max(abs(b - a) / 0.02 for a, b in pairwise(speeds)) < 1.1
 
 
-def turning_places(table):
-    """Return where the finger turned, as seen from the start, m."""
-    along = [place[0] for _, place in sliding(table)]
-    return [b for a, b, c in zip(along, along[1:], along[2:], strict=False) if (b - a) * (c - b) < 0]
-
-
 def test_random_strokes_stay_within_the_stroke_and_are_at_least_half_as_long():
     for seed in range(20):
-        end_of = random_strokes(0.02, np.random.default_rng(seed))
+        ends = StrokeEnds(0.02, 0.01, np.random.default_rng(seed))
         places = [0.0]
         for number in range(20):
-            places.append(end_of(number % 2 == 0, places[-1]))
+            places.append(ends.draw(number % 2 == 0, places[-1]))
         assert min(places) >= 0.0 and max(places) <= 0.02
         lengths = [abs(b - a) for a, b in pairwise(places)]
         assert min(lengths) >= 0.01 - 1e-12
@@ -393,8 +343,9 @@ def test_a_finger_rubs_at_random_places_and_turns_elsewhere_each_time(table):
     assert table.explore(ExplorationRequest('in_hand_random', duration_s=10.0)).success
     along = [place[0] for place in table.places]
     assert min(along) > -0.0005 and max(along) < 0.0205
-    places = turning_places(table)
-    assert len({round(place, 4) for place in places}) > 4  # without chance it turns at two; chance may repeat one
+    along = [place[0] for _, place in sliding(table)]
+    turns = [b for a, b, c in zip(along, along[1:], along[2:], strict=False) if (b - a) * (c - b) < 0]
+    assert len({round(place, 4) for place in turns}) > 4  # without chance it turns at two; chance may repeat one
 
 
 # --------------------
@@ -420,20 +371,6 @@ def test_a_finger_that_trembles_across_its_path_does_not_get_ahead():
     assert follow(StraightPath(1.0, math.pi / 2), trembling).travelled_m == pytest.approx(0.005, rel=1e-3)
 
 
-def test_a_ramp_keeps_to_the_acceleration_and_takes_half_the_speed_in_the_mean():
-    speed, acceleration = 0.2, 1.0
-    duration = ramp_s(speed, acceleration)
-    fractions = [k / 1000 for k in range(1001)]
-    steepest = max(smooth(b) - smooth(a) for a, b in pairwise(fractions)) * 1000
-    assert steepest * speed / duration == pytest.approx(acceleration, rel=1e-3)
-    mean = sum(map(smooth, fractions)) / len(fractions)
-    assert 2 * mean * speed * duration == pytest.approx(ramps_m(speed, duration) - 0.05 * speed)
-
-
-def test_a_ramp_is_flat_outside():
-    assert [smooth(-1.0), smooth(0.0), smooth(0.5), smooth(1.0), smooth(7.0)] == pytest.approx([0, 0, 0.5, 1, 1])
-
-
 def test_a_finger_beside_its_path_is_led_back_at_the_same_speed():
     follower = follow(StraightPath(1.0, 0.0), [(0.0, 0.0), (0.01, 0.001)])
     vx, vy = follower.velocity(0.1)
@@ -442,9 +379,11 @@ def test_a_finger_beside_its_path_is_led_back_at_the_same_speed():
 
 
 @pytest.mark.parametrize('speed', [0.01, 0.05, 0.25])
-def test_no_ramp_exceeds_the_acceleration_or_the_jerk(speed):
+def test_a_ramp_takes_half_the_speed_in_the_mean_and_exceeds_neither_acceleration_nor_jerk(speed):
     duration, dt = ramp_s(speed, 1.0, 20.0), 1e-4
+    assert [smooth(-1.0), smooth(0.0), smooth(0.5), smooth(1.0), smooth(7.0)] == pytest.approx([0, 0, 0.5, 1, 1])
     speeds = [speed * smooth((k * dt) / duration) for k in range(-2, round(duration / dt) + 3)]
+    assert 2 * sum(speeds) * dt == pytest.approx(ramps_m(speed, duration) - 0.05 * speed, rel=0.02)
     accelerations = [(b - a) / dt for a, b in pairwise(speeds)]
     jerks = [(b - a) / dt for a, b in pairwise(accelerations)]
     assert max(map(abs, accelerations)) <= 1.0 * 1.001

@@ -81,7 +81,7 @@ def explored(explorer, on_slide=None):
 
 
 def guard_of(explorer):
-    return explorer.arm._topics._guard.pid
+    return explorer.arm._topics._guard._process.pid
 
 
 def test_another_commander_ends_the_slide_with_the_finger_lifted_and_then_keeps_the_arm_from_being_taken(

@@ -23,7 +23,7 @@ def test_a_limit_below_what_may_be_asked_for_is_refused():
 
 def test_a_finger_within_all_limits_violates_nothing():
     arm = ArmState(0, (0.0, 0.1, -0.001), REST, 9.9)
-    assert SafetyLimits().force_violation(arm) == SafetyLimits().workspace_violation(arm) == ''
+    assert SafetyLimits().force_violation(arm) == SafetyLimits().outside(arm.position) == ''
 
 
 @pytest.mark.parametrize('force', [10.1, math.nan, math.inf])
@@ -31,10 +31,8 @@ def test_a_force_that_is_too_high_or_unknown_is_a_violation(force):
     assert 'above the limit' in SafetyLimits().force_violation(ArmState(0, REST, REST, force))
 
 
-def test_a_position_outside_is_a_violation():
-    assert SafetyLimits().workspace_violation(ArmState(0, (0.0, 0.3, 0.0), REST, 0.0)) == (
-        'the finger left the workspace: y is 0.3000 m, allowed is -0.2 to 0.2 m'
-    )
+def test_a_position_outside_is_named_by_its_axis():
+    assert SafetyLimits().outside((0.0, 0.3, 0.0)) == 'y is 0.3000 m, allowed is -0.2 to 0.2 m'
 
 
 def test_the_room_is_the_way_to_the_nearest_wall():

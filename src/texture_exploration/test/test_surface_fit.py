@@ -37,26 +37,27 @@ def test_the_residual_is_that_of_touches_beside_the_plane():
     assert fit.largest_m == pytest.approx(1e-4)
 
 
-def test_touches_nearly_in_a_line_are_refused_with_what_is_needed():
-    line = [(0.0, 0.0, 0.0), (0.1, 0.002, 0.0), (0.2, 0.0, 0.0)]
-    with pytest.raises(InvalidData, match=r'nearly in a line: .* 2\.0 mm, and 10 mm are needed'):
-        fit_surface(line, UP, AHEAD)
-
-
-def test_a_bent_surface_is_refused():
-    with pytest.raises(InvalidData, match='do not lie in a plane'):
-        fit_surface([*CORNERS, (0.35, 0.02, 0.12)], UP, AHEAD)
-
-
 def tilted(angle_rad):
     axes = rotation_matrix((angle_rad, 0.0, 0.0))
     return [axes @ np.array([x, y, 0.0]) for x, y in ((0.0, 0.0), (0.1, 0.0), (0.1, 0.1), (0.0, 0.1))]
 
 
-@pytest.mark.parametrize('degrees', [16.0, 60.0, 90.0])
-def test_a_plane_that_is_turned_by_more_than_15_degrees_is_refused_with_its_angle(degrees):
-    with pytest.raises(InvalidData, match=f'turned by {degrees:.0f} degrees against the pose'):
-        fit_surface(tilted(math.radians(degrees)), UP, AHEAD)
+LINE = [(0.0, 0.0, 0.0), (0.1, 0.002, 0.0), (0.2, 0.0, 0.0)]
+REFUSED = {
+    'a line': (LINE, r'nearly in a line: .* 2\.0 mm, and 10 mm are needed'),
+    'bent': ([*CORNERS, (0.35, 0.02, 0.12)], 'do not lie in a plane'),
+    **{
+        f'{angle:.0f}°': (tilted(math.radians(angle)), f'by {angle:.0f} degrees against')
+        for angle in (16.0, 60.0, 90.0)
+    },
+}
+
+
+@pytest.mark.parametrize('name', REFUSED)
+def test_touches_that_make_no_plane_near_the_pose_before_are_refused_with_what_is_needed(name):
+    touches, sentence = REFUSED[name]
+    with pytest.raises(InvalidData, match=sentence):
+        fit_surface(touches, UP, AHEAD)
     assert fit_surface(tilted(math.radians(14.0)), UP, AHEAD).pose[3] == pytest.approx(math.radians(14.0))
 
 

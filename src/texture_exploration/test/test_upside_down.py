@@ -38,8 +38,7 @@ def test_a_finger_that_was_left_pressed_is_lifted_however_soft_the_surface(make_
 def press(robot, depth_m):
     """Put the finger below the surface, at rest."""
     robot.machine.position = robot.machine.position - depth_m * robot.machine._axes[:, 2]
-    for _ in range(20):
-        robot.pace()
+    robot.pass_time(0.2)
 
 
 def test_a_second_rise_counts_the_force_from_the_first(make_robot):

@@ -17,5 +17,5 @@ while True:
     arm.command(ArmCommand(tangential_m_s=(0.02, 0.0)))
     if not reported and arm.state().velocity[0] > 0.01:
         reported = True
-        print(arm.worker_pid, flush=True)
+        print(arm._link.process.pid, flush=True)
     time.sleep(0.02)

@@ -10,11 +10,11 @@ import threading
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
-from texture_core.errors import DeviceError, ExplorationError, MotionRefused, TextureError, UnknownName
+from texture_core.errors import CommandRefused, DeviceError, ExplorationError, MotionRefused, TextureError, UnknownName
 from texture_core.types import ENDED, ExplorationRequest, ExplorationState, Phase, RoughnessEstimate, TextureEstimate
 from texture_exploration.arms.arm import Arm, ArmCommand, ArmState, SurfaceFrame
 from texture_exploration.guards import GAP_NS, WITHOUT_GAPS, ForceGuard, ForceWatch, Listening, sound
@@ -31,36 +31,21 @@ def may_stop(estimate: TextureEstimate) -> bool:
 
 
 class ExplorationEstimates:
-    """The newest texture and roughness estimate of one exploration; safe for threads."""
+    """The newest texture and roughness estimate of one exploration."""
 
     def __init__(self, exploration_id: str) -> None:
         self.texture = TextureEstimate(0, exploration_id)
         self.roughness = RoughnessEstimate(0, exploration_id)
-        self._changed = threading.Condition()
-        self._cancelled = False
 
     def update(self, estimate: TextureEstimate | RoughnessEstimate) -> None:
         """Take a newer estimate."""
-        with self._changed:
-            if isinstance(estimate, TextureEstimate):
-                self.texture = estimate
-            else:
-                self.roughness = estimate
-            self._changed.notify_all()
+        if isinstance(estimate, TextureEstimate):
+            self.texture = estimate
+        else:
+            self.roughness = estimate
 
-    def wait_until_final(self, kinds: Collection[str], timeout_s: float) -> bool:
-        """Wait until the estimates of these kinds ('texture', 'roughness') are final; return whether they are."""
-        with self._changed:
-            self._changed.wait_for(lambda: self._cancelled or self._final(kinds), timeout_s)
-            return self._final(kinds)
-
-    def cancel(self) -> None:
-        """End the wait: no further estimate will arrive."""
-        with self._changed:
-            self._cancelled = True
-            self._changed.notify_all()
-
-    def _final(self, kinds: Collection[str]) -> bool:
+    def final(self, kinds: Collection[str]) -> bool:
+        """Return whether the estimates of these kinds ('texture', 'roughness') are final."""
         return all(getattr(self, kind).final for kind in kinds)
 
 
@@ -92,13 +77,6 @@ class ExplorationOutcome:
         """Whether it was completed."""
         return self.error is ExplorationError.NONE
 
-    @property
-    def severity(self) -> Literal['info', 'warning', 'error']:
-        """Level of the log: an abort is a warning, a finger that was not lifted is an error."""
-        if self.success:
-            return 'info'
-        return 'warning' if self.lifted else 'error'
-
     def sentence(self, exploration_id: str) -> str:
         """Return the message for the log."""
         lifted = '' if self.success or not self.lifted else '; the finger was lifted'
@@ -126,6 +104,8 @@ def refusal(error: TextureError) -> ExplorationError:
     """Return the code of what `Explorer.begin` raises, or of a request that cannot be read."""
     if isinstance(error, MotionRefused):
         return error.error
+    if isinstance(error, DeviceError):
+        return ExplorationError.ARM_NOT_READY
     return ExplorationError.UNKNOWN_MOTION if isinstance(error, UnknownName) else ExplorationError.INVALID_REQUEST
 
 
@@ -183,26 +163,28 @@ class Exploration:
         try:
             while not self._tick():
                 pace()
+        except CommandRefused as error:  # the arm obeys
+            self._escape(ExplorationError.ARM_FAULT, str(error), pace)
         except DeviceError as error:
             self._give_up(ExplorationError.ARM_FAULT, f'{error}; the finger was not lifted')
         except Exception as error:
-            self._escape(error, pace)
+            self._escape(ExplorationError.INTERNAL, f'internal error, {type(error).__name__}: {error}', pace)
         finally:
             with contextlib.suppress(DeviceError):
                 self._arm.stop()
         return self.outcome
 
-    def _escape(self, error: Exception, pace: Callable[[], None]) -> None:
+    def _escape(self, error: ExplorationError, reason: str, pace: Callable[[], None]) -> None:
         """Command zero and lift by a separate stage without the failed part; report it."""
         LOGGER.exception('an exploration failed')
-        reason, lifted = f'internal error, {type(error).__name__}: {error}'[:MOST_CHARACTERS], False
+        reason, lifted = reason[:MOST_CHARACTERS], False
         try:
             self._arm.stop()
             lifted = self._lift_alone(pace)
         except Exception as second:
             reason += f'; then {type(second).__name__}: {second}'[:MOST_CHARACTERS]
         how = 'see the log' if lifted else 'the finger was not lifted'
-        self.outcome = ExplorationOutcome(ExplorationError.INTERNAL, f'{reason}; {how}', self._slid, lifted)
+        self.outcome = ExplorationOutcome(error, f'{reason}; {how}', self._slid, lifted)
         with contextlib.suppress(Exception):  # the receiver of the states may be the failed part
             self._report(self._clock(), Phase.ABORTED, progress=self.state.progress)
 
@@ -240,7 +222,10 @@ class Exploration:
     def _tick(self) -> bool:
         """Do one step; return whether the exploration has ended."""
         arm, now_ns = self._sound_state(), self._clock()
-        self._detect_gap(now_ns)
+        if now_ns - self._last_ns > GAP_NS:
+            self._listening = Listening(self._begin_ns, self._last_ns, now_ns)
+            self.gaps += 1
+        self._last_ns = now_ns
         fault = arm_fault(arm, now_ns, self._limits, self._listening)
         if fault:
             self._give_up(ExplorationError.ARM_FAULT, f'{fault}; the finger was not lifted')
@@ -250,7 +235,9 @@ class Exploration:
         if reason:
             self._abort = self._abort or reason
             self._motion.abort(reason[1])
-        if self._awaits_samples():
+        # The finger rests until the sensor delivers; silence from before the request counts.
+        self._signal_seen = self._signal_seen or bool(self._abort) or not self._signal_fault(WITHOUT_GAPS)
+        if not self._signal_seen:
             self._arm.command(ArmCommand())
             return False
         if self._finish_reason:
@@ -270,11 +257,6 @@ class Exploration:
         self._publish_state(now_ns, step, arm)
         return step.phase in ENDED
 
-    def _awaits_samples(self) -> bool:
-        """Return whether the finger rests until the sensor delivers; silence from before the request counts."""
-        self._signal_seen = self._signal_seen or bool(self._abort) or not self._signal_fault(WITHOUT_GAPS)
-        return not self._signal_seen
-
     @property
     def _error(self) -> ExplorationError:
         """Why it is aborted, by the loop or by its motion."""
@@ -282,15 +264,18 @@ class Exploration:
 
     def _reason_to_abort(self, now_ns: int, arm: ArmState, relative: ArmState) -> tuple[ExplorationError, str] | None:
         """Return why it must end; a finger that was pushed out of the workspace may return first."""
-        workspace_violation = self._limits.workspace_violation(arm)
-        self._entered |= not workspace_violation
+        outside = self._limits.outside(arm.position)
+        self._entered |= not outside
         frozen = self._force_watch.frozen(arm, self._commanded)
         reasons = (
             (ExplorationError.ARM_FAULT, arm.unsafe),
             (ExplorationError.FORCE_LIMIT, self._guard.violation(relative, self.state.phase)),
             (ExplorationError.FORCE_SENSOR, frozen),
             (ExplorationError.NO_SURFACE, self._off_surface(arm)),
-            (ExplorationError.WORKSPACE, workspace_violation if self._entered else ''),
+            (
+                ExplorationError.WORKSPACE,
+                f'the finger left the workspace: {outside}' if outside and self._entered else '',
+            ),
             (ExplorationError.ARM_FAULT, self._arm.doubt()),
             (ExplorationError.NO_SIGNAL, self._signal_fault(self._listening)),
             (ExplorationError.TIMEOUT, self._overdue(now_ns)),
@@ -316,12 +301,6 @@ class Exploration:
         timeout_s = self.request.timeout_s
         late = timeout_s > 0.0 and (now_ns - self._begin_ns) * 1e-9 > timeout_s
         return f'the exploration took longer than its timeout of {timeout_s:g} s' if late else ''
-
-    def _detect_gap(self, now_ns: int) -> None:
-        if now_ns - self._last_ns > GAP_NS:
-            self._listening = Listening(self._begin_ns, self._last_ns, now_ns)
-            self.gaps += 1
-        self._last_ns = now_ns
 
     def _publish_state(self, now_ns: int, step: MotionStep, arm: ArmState) -> None:
         """Report the state if its phase is new or the time has come."""

@@ -32,20 +32,11 @@ GENTLE_N = 1.0  # the force of a finger found in contact is unknown: it rises as
 
 
 class Explorer:
-    """Own an arm and explore with it.
+    """Own an arm, not yet connected, and explore with it.
 
-    Parameters
-    ----------
-    arm
-        Not yet connected.
-    touch, limits
-        How to touch, and what is allowed.
-    on_state
-        Called with each state of each exploration, in the thread that moves; stamps are of `clock`.
-    clock
-        CLOCK_MONOTONIC in ns.
-    signal_fault
-        Watches over the sensor; see `Exploration`.
+    `on_state` is called with each state of each exploration, in the thread that moves; its stamps are of `clock`,
+    CLOCK_MONOTONIC in ns. `signal_fault` watches over the sensor. What cannot be done now raises MotionRefused, an arm
+    that cannot be reached DeviceError.
     """
 
     def __init__(
@@ -64,7 +55,7 @@ class Explorer:
         self.counts: Counter[str] = Counter(done=0, aborted=0, refused=0, internal_errors=0, late_steps=0)
         self._on_state = on_state
         self._signal_fault = signal_fault
-        self._clock = clock
+        self.clock = clock
         self._lock = threading.Lock()
         self._home: Vector | None = None
         self._lift_first = True  # contact state unknown
@@ -80,11 +71,6 @@ class Explorer:
         """Reach the arm, or reach it again after a fault; return where explorations begin.
 
         The next exploration lifts first, as the contact state is unknown.
-
-        Raises
-        ------
-        DeviceError
-            If it cannot be reached.
         """
         self._lift_first, self.lifted, self._zero_n = True, False, None
         self.arm.close()
@@ -95,13 +81,7 @@ class Explorer:
         return self._home
 
     def check_start(self) -> None:
-        """Return if explorations may begin at the present start, so that this is known before the first request.
-
-        Raises
-        ------
-        MotionRefused
-            If that place is outside the workspace, along which axes.
-        """
+        """Return if explorations may begin at the present start, so that this is known before the first request."""
         if self._home is not None:
             self._check_inside(self._home)
 
@@ -118,14 +98,10 @@ class Explorer:
         if not self.arm.keeps_start:
             self._home = None
 
-    def now_ns(self) -> int:
-        """Return the time on the clock of the states."""
-        return self._clock()
-
     def arm_age_s(self) -> float:
         """Return the age of the newest state of the arm, s; NaN if it cannot be reached."""
         try:
-            return (self._clock() - self.arm.state().time_ns) * 1e-9
+            return (self.clock() - self.arm.state().time_ns) * 1e-9
         except DeviceError:
             return math.nan
 
@@ -141,7 +117,7 @@ class Explorer:
             state = self.arm.state()
         except DeviceError as error:
             return str(error)
-        return arm_fault(state, self._clock(), self.limits) or state.unsafe
+        return arm_fault(state, self.clock(), self.limits) or state.unsafe
 
     @property
     def current(self) -> Exploration | None:
@@ -150,13 +126,7 @@ class Explorer:
         return current if current is not None and not current.ended.is_set() else None
 
     def begin(self, exploration_id: str, request: ExplorationRequest) -> Exploration:
-        """Begin an exploration in a separate thread; wait for its event `ended`.
-
-        Raises
-        ------
-        MotionRefused, UnknownName
-            If the request, the arm or a running exploration does not allow it.
-        """
+        """Begin an exploration in a separate thread; wait for its event `ended`."""
         with self._lock:
             try:
                 exploration = self._prepare(exploration_id, request)
@@ -189,13 +159,6 @@ class Explorer:
         """Free the arm from a fault, by its recovery or by connecting again; the caller makes sure that it may move.
 
         The next exploration lifts first, as the finger may still press.
-
-        Raises
-        ------
-        MotionRefused
-            If an exploration is running.
-        DeviceError
-            If the fault remains.
         """
         with self._lock:
             self._check_idle()
@@ -210,13 +173,6 @@ class Explorer:
         """Lift a finger that a killed explorer may have left pressed, until nothing touches it; return the rise, m.
 
         The caller makes sure that the finger may rise; `stop` ends it.
-
-        Raises
-        ------
-        MotionRefused
-            If an exploration is running, or the finger does not come free.
-        DeviceError
-            If the arm cannot be reached, or reports a fault.
         """
         with self._lock:
             self._check_idle()
@@ -224,8 +180,16 @@ class Explorer:
             if self._home is None or self.fault():
                 self._home = self.connect()
             begin_m = self.arm.state().position[2]
+            rise, pace = Rise(GENTLE_N, self.touch, self.limits), Pacer(PERIOD_S, self.clock)
+            rise.begin(self.clock(), self.arm.state())
             try:
-                self._rise()
+                while (command := rise.timed_step(self.clock(), self.arm.state())) is not None:
+                    if self._lift_ends.is_set():
+                        raise MotionAborted('it was stopped')
+                    self.arm.command(command)
+                    pace()
+                    if fault := self.fault():
+                        raise DeviceError(f'the finger was not lifted: {fault}')
             except MotionAborted as error:
                 raise MotionRefused(f'the finger was not lifted: {error}') from error
             finally:
@@ -235,31 +199,8 @@ class Explorer:
             self._home = (x_m, y_m, max(z_m, height_m))  # a place in contact is no start
             return height_m - begin_m
 
-    def _rise(self) -> None:
-        rise, pace = Rise(GENTLE_N, self.touch, self.limits), Pacer(PERIOD_S, self._clock)
-        rise.begin(self._clock(), self.arm.state())
-        while True:
-            if fault := self.fault():
-                raise DeviceError(f'the finger was not lifted: {fault}')
-            if self._lift_ends.is_set():
-                raise MotionAborted('it was stopped')
-            now_ns, state = self._clock(), self.arm.state()
-            command = rise.timed_step(now_ns, state)
-            if command is None:
-                return
-            self.arm.command(command)
-            pace()
-
     def reboot(self) -> str:
-        """Reboot the motors that report an error; return what was done. The arm is released until the next request.
-
-        Raises
-        ------
-        MotionRefused
-            If an exploration is running, or the arm has no motors that could be rebooted.
-        DeviceError
-            If a motor stays in its error.
-        """
+        """Reboot the motors that report an error; return what was done. The arm is released until the next request."""
         with self._lock:
             self._check_idle()
             return self.arm.reboot()
@@ -269,23 +210,23 @@ class Explorer:
 
         From the fourth touch on the plane through all touches is the surface. The next exploration connects again and
         begins where the finger is then: lift it before.
-
-        Raises
-        ------
-        MotionRefused
-            If an exploration is running, the arm has no base frame, the finger does not press with
-            `contact_force_n`, or the touches make no plane.
-        DeviceError
-            If the arm cannot be reached.
         """
         with self._lock:
             self._check_idle()
-            arm = self.arm
             self._check_surface()
             if self.fault():
                 self.connect()
-            state, frame = self.arm.state(), SurfaceFrame(arm.surface_pose)
-            self._check_touch(state.force_n)
+            state, frame, least_n = self.arm.state(), SurfaceFrame(self.arm.surface_pose), self.touch.contact_force_n
+            if not self.arm.zeroed:
+                raise MotionRefused(
+                    'the touch was not recorded: the force sensor is not zeroed, so contact cannot be shown; lift the '
+                    'finger by 10 mm, let it rest in the air for a second, and touch again'
+                )
+            if not state.force_n >= least_n:  # so NaN is also no touch
+                raise MotionRefused(
+                    f'the touch was not recorded: the force is {state.force_n:.2f} N, and {least_n:g} N are needed '
+                    "('contact_force_n'); press the finger on the surface"
+                )
             self._home = None
             try:
                 fit = self._touches.add(
@@ -298,7 +239,7 @@ class Explorer:
             if fit is None:
                 last = ', far from the others: it checks the first three' if missing == 1 else 's'
                 return f'{count}; touch the surface at {missing} more place{last}'
-            arm.move_surface(fit.pose)
+            self.arm.move_surface(fit.pose)
             self.patch = fit.patch
             names = (f'surface_{name}' for name in ('x_m', 'y_m', 'z_m', 'rx_rad', 'ry_rad', 'rz_rad'))
             numbers = {**dict(zip(names, fit.pose, strict=True)), **asdict(fit.patch)}
@@ -308,28 +249,8 @@ class Explorer:
                 f'{1e3 * fit.largest_m:.2f} mm. Write these into your parameter file, and lift the finger by 10 mm'
             )
 
-    def _check_touch(self, force_n: float) -> None:
-        """Refuse a touch without sufficient force."""
-        least_n = self.touch.contact_force_n
-        if not self.arm.zeroed:
-            raise MotionRefused(
-                'the touch was not recorded: the force sensor is not zeroed, so contact cannot be shown; lift the '
-                'finger by 10 mm, let it rest in the air for a second, and touch again'
-            )
-        if not force_n >= least_n:  # so NaN is also no touch
-            raise MotionRefused(
-                f'the touch was not recorded: the force is {force_n:.2f} N, and {least_n:g} N are needed '
-                "('contact_force_n'); press the finger on the surface"
-            )
-
     def forget_touches(self) -> int:
-        """Begin the touches of the surface again; return how many are forgotten. The surface stays as it is.
-
-        Raises
-        ------
-        MotionRefused
-            If the arm has no base frame.
-        """
+        """Begin the touches of the surface again; return how many are forgotten. The surface stays as it is."""
         with self._lock:
             self._check_surface()
             return self._touches.forget()
@@ -358,14 +279,15 @@ class Explorer:
         plan = find(MOTIONS, request.motion, 'motion')
         start = self.patch.start(request, self._ready(), self.limits)
         self._check_inside(start)
-        motion = plan(request, start, self.touch, self.limits)
-        if request.use_start:
-            try:
-                plan(request, start, self.touch, self.patch.within(self.limits))
-            except MotionRefused as error:
-                sentence = f'{error}; the workspace of a request with a start is the surface patch'
-                raise MotionRefused(sentence, error.error, error.field) from error
-        if self._lift_first:
+        limits = self.patch.within(self.limits) if request.use_start else self.limits
+        try:
+            motion = plan(request, start, self.touch, limits)
+        except MotionRefused as error:
+            if not request.use_start or error.error is not ExplorationError.OUTSIDE_WORKSPACE:
+                raise
+            sentence = f'{error}; the workspace of a request with a start is the surface patch'
+            raise MotionRefused(sentence, error.error, error.field) from error
+        if self._lift_first or not self.arm.zeroed:
             if self._zero_n is None or self.arm.zeroed:
                 self._zero_n = self.arm.state().force_vector_n
             motion.lift_first(lambda: self.arm.zeroed, self._zero_n)
@@ -375,7 +297,7 @@ class Explorer:
             arm=self.arm,
             motion=motion,
             limits=self.limits,
-            clock=self._clock,
+            clock=self.clock,
             on_state=self._on_state,
             signal_fault=self._signal_fault,
         )
@@ -414,7 +336,7 @@ class Explorer:
 
     def _run(self, exploration: Exploration) -> None:
         try:
-            exploration.run(Pacer(PERIOD_S, self._clock))
+            exploration.run(Pacer(PERIOD_S, self.clock))
         finally:
             self._lift_first, self.lifted = not exploration.outcome.success, exploration.outcome.lifted
             self.counts['done' if exploration.outcome.success else 'aborted'] += 1
@@ -428,11 +350,11 @@ class Pacer:
 
     def __init__(self, period_s: float, clock: Callable[[], int]) -> None:
         self._period_ns = round(period_s * 1e9)
-        self._clock = clock
+        self.clock = clock
         self._due_ns = clock()
 
     def __call__(self) -> None:
         """Sleep."""
-        now_ns = self._clock()
+        now_ns = self.clock()
         self._due_ns = max(self._due_ns + self._period_ns, now_ns)
         time.sleep((self._due_ns - now_ns) * 1e-9)

@@ -124,33 +124,19 @@ class ForceLoopParams:
 
     loop_delay_s: float = param(
         0.008,
-        'Largest delay from a measured force to the motion that responds to it; larger values lower the gain.',
+        'Largest delay from a force to the motion that responds; larger: lower gain.',
         unit='s',
         low=0.0,
         high=0.1,
     )
     max_stiffness_n_m: float = param(
-        5000.0,
-        'Stiffest contact of finger and surface that is expected; larger values lower the approach speed and the gain.',
-        unit='N/m',
-        low=100.0,
-        high=200000.0,
+        5000.0, 'Stiffest contact; larger: slower approach, lower gain.', unit='N/m', low=100.0, high=200000.0
     )
     max_impact_n: float = param(
-        0.15,
-        'Largest impact force on the stiffest surface before the arm can react; a larger force '
-        'allows a faster approach.',
-        unit='N',
-        low=0.01,
-        high=5.0,
+        0.15, 'Largest impact on the stiffest surface; larger: faster approach.', unit='N', low=0.01, high=5.0
     )
     touching_n: float = param(
-        TOUCHING_N,
-        'Force above which the force control treats the finger as in contact; it must exceed the noise of the '
-        'force sensor. A larger force meets the surface harder.',
-        unit='N',
-        low=0.005,
-        high=5.0,
+        TOUCHING_N, 'Force that counts as contact; above the noise of its sensor.', unit='N', low=0.005, high=5.0
     )
 
     def gain_m_s_n(self, period_s: float) -> float:

@@ -137,7 +137,8 @@ class ForceWatch:
         if self._repeats < MIN_REPEATS or same_s < self._limits.frozen_force_s:
             return ''
         moved_m = abs(arm.position[2] - self._first.position[2])
-        if self._reading is not ForceReading.NOISY and not self._implausible(arm.force_n, moved_m):
+        moves_in_contact = arm.force_n - self._free_air_n >= CONTACT_N and moved_m >= FROZEN_TRAVEL_M
+        if self._reading is not ForceReading.NOISY and not moves_in_contact:
             return ''
         return (
             f'the measured force is frozen: it has been {arm.force_n:.3f} N for {same_s * 1e3:.0f} ms, while the '
@@ -147,15 +148,26 @@ class ForceWatch:
     def note(self, phase: Phase, arm: ArmState, command: ArmCommand) -> None:
         """Note the force in free air, before the contact and after it."""
         if phase is Phase.APPROACH:
-            self._note_free(arm, command)
+            if self._begin_ns is None or command == ArmCommand():
+                self._begin_ns = arm.time_ns
+            if arm.time_ns - self._begin_ns <= ZEROING_S * 1e9:
+                self._before.clear()
+            self._before.append(arm.force_n)
         elif phase is Phase.LIFT:
             self._lift.append((arm.position[2], arm.force_n))
 
     def drifted(self) -> str:
-        """Return in a sentence that the force in free air has changed over the exploration, '' if it has not."""
-        after = self._forces_above()
-        if not self._before or not after:
+        """Return in a sentence that the force in free air has changed over the exploration, '' if it has not.
+
+        After it, the last forces in the upper half of the lift count: the finger still presses while it brakes, and a
+        busy machine may get only few states of the lift.
+        """
+        if not self._before or not self._lift:
             return ''
+        low_m, high_m = min(height_m for height_m, _ in self._lift), self._lift[-1][0]
+        if high_m - low_m < MIN_RISE_M:
+            return ''
+        after = [force_n for height_m, force_n in self._lift if height_m > 0.5 * (low_m + high_m)][-AFTER:]
         before_n, after_n = self._free_air_n, statistics.median(after)
         if abs(after_n - before_n) <= self._limits.force_drift_fraction * self._wanted_n:
             return ''
@@ -164,33 +176,10 @@ class ForceWatch:
             'drifted, and the true force was wrong by up to the difference; let it warm up, zero it and check it'
         )
 
-    def _note_free(self, arm: ArmState, command: ArmCommand) -> None:
-        if self._begin_ns is None or command == ArmCommand():
-            self._begin_ns = arm.time_ns
-        if arm.time_ns - self._begin_ns <= ZEROING_S * 1e9:
-            self._before.clear()
-        self._before.append(arm.force_n)
-
-    def _forces_above(self) -> list[float]:
-        """Return the last forces in the upper half of the lift.
-
-        The finger still presses while it brakes, and a busy machine may get only few states of the lift.
-        """
-        if not self._lift:
-            return []
-        low_m, high_m = min(height_m for height_m, _ in self._lift), self._lift[-1][0]
-        if high_m - low_m < MIN_RISE_M:
-            return []
-        middle_m = 0.5 * (low_m + high_m)
-        return [force_n for height_m, force_n in self._lift if height_m > middle_m][-AFTER:]
-
     @property
     def _free_air_n(self) -> float:
         """The force without contact, as it was before the contact; 0 until it is known."""
         return sorted(self._before)[int(LOW_FRACTION * len(self._before))] if self._before else 0.0
-
-    def _implausible(self, force_n: float, moved_m: float) -> bool:
-        return force_n - self._free_air_n >= CONTACT_N and moved_m >= FROZEN_TRAVEL_M
 
     def _holds(self, force_n: float, command: ArmCommand) -> bool:
         """Return whether the arm controls the force to a constant value."""
@@ -214,7 +203,8 @@ class ForceGuard:
         self._zero: Vector | None = None  # reading of the sensor at the start, while it is not zeroed
         self._way: deque[tuple[int, ArmCommand, float]] = deque()  # with the size of the force
         self._back: ArmCommand | None = None
-        self._back_ns = 0
+        self._back_ns = self._newest_ns = 0
+        self._paused = False
         self._came_back = False  # there is one way back
         self._largest_n = 0.0
 
@@ -237,18 +227,24 @@ class ForceGuard:
         """Return the command; or, after an abort, the way back as long as the finger is blocked."""
         now_ns, size_n = arm.time_ns, arm.force_size_n
         held = bool(self._limits.force_violation(arm) or self._limits.friction_violation(arm))
-        while self._way and now_ns - self._way[0][0] > WAY_S * 1e9:
-            self._way.popleft()
         if aborted and held and self._way:
             # A force that did not grow on the way, as that of a broken sensor, does not end on the way back.
             if size_n - min(before_n for _, _, before_n in self._way) > self._limits.tangential_floor_n:
-                self._back, self._back_ns = self._way_back(), now_ns
+                self._back = self._way_back()
+                self._back_ns = self._newest_ns = now_ns
             self._way.clear()
             self._came_back = True
         if self._back is None:
             if not self._came_back:
                 self._way.append((now_ns, command, size_n))
+                # Counted from the newest command: after a pause of this process it is the one that led to the obstacle.
+                while now_ns - self._way[0][0] > WAY_S * 1e9:
+                    self._way.popleft()
             return command
+        # After a pause of this process the way back has yet to take effect; only once, so that it ends.
+        if now_ns - self._newest_ns > GAP_NS and not self._paused:
+            self._paused, self._back_ns = True, now_ns
+        self._newest_ns = now_ns
         # Half of the allowance: what is left then is no more than noise.
         self._largest_n = max(self._largest_n, size_n)
         back_s = (now_ns - self._back_ns) * 1e-9
@@ -289,11 +285,7 @@ class SignalWatchParams:
         "Topics whose samples are watched, separated by spaces: 'finger0/signal finger1/signal' for two fingers.",
     )
     signal_timeout_s: float = param(
-        0.5,
-        'How long no sample may arrive before the exploration is aborted.',
-        unit='s',
-        low=0.02,
-        high=5.0,
+        0.5, 'How long no sample may arrive before the exploration aborts.', unit='s', low=0.02, high=5.0
     )
 
     def __post_init__(self) -> None:

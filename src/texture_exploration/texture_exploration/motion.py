@@ -5,16 +5,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from texture_core.errors import ExplorationError, MotionAborted, MotionRefused
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.arm import ArmCommand, ArmState, Vector
-from texture_exploration.lift_first import CalmDown, Detour, GoBack, Rise
-from texture_exploration.safety import SafetyLimits
+from texture_exploration.force_control import HALF_S, HARD, LATE_S
+from texture_exploration.guards import SignalWatchParams
+from texture_exploration.lift_first import MOST_FORCE_SHARE, CalmDown, Detour, GoBack, Rise
+from texture_exploration.paths import Follower
+from texture_exploration.safety import MOST_FORCE_N, MOST_M, CommandLimits, SafetyLimits
 from texture_exploration.stages import (
     AccelerateStage,
+    Along,
     ApproachStage,
     BrakeStage,
     GoHomeStage,
@@ -24,6 +28,7 @@ from texture_exploration.stages import (
     Stage,
 )
 from texture_exploration.touch import WALL_SHARE, TouchParams
+from texture_exploration.watches import OVERSHOOT, ContactWatch
 
 # --------------------
 # One step of a motion.
@@ -49,27 +54,30 @@ class MotionStep:
 
 
 class Motion:
-    """One planned exploration: go through the stages; on any error go to the last one, which lifts the finger.
+    """One planned exploration: go there, touch, press, speed up, slide along a path, brake and lift.
 
-    It reads no clock and no arm: each step gets the time and the state of the arm.
-
-    Parameters
-    ----------
-    stages
-        In their order; the last one lifts.
-    slide
-        The one among them that slides.
-
-    Attributes
-    ----------
-    error
-        Why the motion aborted; NONE if it did not, or was aborted from outside.
+    On any error it goes to the last stage, which lifts the finger. It reads no clock and no arm: each step gets the
+    time and the state of the arm. `follower` steers along the path, for a request with speed and force filled in and
+    checked; `home` is the place above which the finger comes down, m, in the frame of the surface. `error` is why the
+    motion aborted; NONE if it did not, or was aborted from outside.
     """
 
-    def __init__(self, stages: Sequence[Stage], slide: SlideStage) -> None:
-        self._remaining_stages = list(stages)
-        self._lift = stages[-1]
-        self._slide = slide
+    def __init__(
+        self, follower: Follower, request: ExplorationRequest, home: Vector, touch: TouchParams, limits: SafetyLimits
+    ) -> None:
+        speed, force = request.speed_m_s, request.force_n
+        along = Along(follower, speed, force, touch, limits, ContactWatch(force, touch))
+        self._slide = SlideStage(along)
+        self._lift = LiftStage(home, force, touch, limits)
+        self._remaining_stages: list[Stage] = [
+            GoHomeStage(home, touch, limits),
+            ApproachStage(force, touch, limits),
+            SettleForceStage(force, touch, limits),
+            AccelerateStage(along),
+            self._slide,
+            BrakeStage(along),
+            self._lift,
+        ]
         self._stage: Stage | None = None
         self._phase = Phase.IDLE
         self._abort_reason = ''
@@ -82,12 +90,8 @@ class Motion:
     def lift_first(self, zeroed: Callable[[], bool], zero_n: Vector | None = None) -> Motion:
         """Begin with a lift and a rest, and return itself.
 
-        Parameters
-        ----------
-        zeroed
-            Whether the force sensor of the arm is valid once it is at rest in free air.
-        zero_n
-            What it shows before the first lift since the arm was connected; None: before this one.
+        `zeroed` tells whether the force sensor of the arm is valid once it is at rest in free air; `zero_n` is what it
+        shows before the first lift since the arm was connected, None before this one.
         """
         along = self._slide.along
         self._zeroed = zeroed
@@ -131,7 +135,7 @@ class Motion:
             command=command,
             phase=self._phase,
             steady_s=self._stage.steady_s if self._stage else 0.0,
-            direction_rad=self._slide.direction_rad,
+            direction_rad=self._slide.along.follower.direction_rad,
             progress=self._slide.progress,
         )
 
@@ -154,7 +158,7 @@ class Motion:
         """End the slide as soon as the guaranteed time is over; without effect before and after it."""
         if self._stage is self._slide and not self._finish_reason:
             self._finish_reason = reason
-            self._slide.finish()
+            self._slide.finishing = True
 
     def note_way_back(self) -> None:
         """Note that the finger moved back from an obstacle instead of the last command."""
@@ -247,3 +251,33 @@ def state_table() -> str:
         f'| `{state.__name__}` | {", ".join(state.commands)} | {state.ends} | {state.on_error} |' for state in STATES
     )
     return '\n'.join(rows)
+
+
+# --------------------
+# All limits, once, with their defaults: name, quantity, value, who checks, how fast, what follows; docs/motion.md shows
+# them.
+
+_l, _t, _c = SafetyLimits(), TouchParams(), CommandLimits()
+_wall_n, _timeouts = WALL_SHARE * _l.force_limit_n, (_l.contact_timeout_s, _l.slide_overtime_s, _l.lift_timeout_s)
+LIMITS = f"""\
+| `MOST_FORCE_N, MOST_M` | number of a sample | finite, {MOST_FORCE_N / 1e3:g} kN, {MOST_M:g} m | arm and Exploration | at once | lift |
+| `force_limit_n` | force in any direction | {_l.force_limit_n:g} N | ForceGuard | each step, 10 ms | way back, lift |
+| `WALL_SHARE` | force at a wall, foreseen | {WALL_SHARE:g} × force_limit_n, {_wall_n:g} N | Exploration | before it moves | refused |
+| `friction_limit` | force along the surface | {_l.friction_limit:g} × normal + {_l.tangential_floor_n:g} N | ForceGuard | each step, 10 ms | way back, lift |
+| `x_low_m to z_high_m` | place | ±{_l.x_high_m:g} m; {_l.z_low_m:g} to {_l.z_high_m:g} m | Exploration | each step, 10 ms | lift |
+| `surface_tolerance_m` | height of the contact | {1e3 * _l.surface_tolerance_m:g} mm | Exploration | each step, 10 ms | lift |
+| `state_timeout_s` | age of the state | {_l.state_timeout_s:g} s | Exploration | each step, 10 ms | stop |
+| `signal_timeout_s` | silence of the sensor | {SignalWatchParams().signal_timeout_s:g} s | SignalWatch | each step, 10 ms | lift |
+| `frozen_force_s` | force that repeats | {_l.frozen_force_s:g} s | ForceWatch | each step, 10 ms | lift |
+| `force_drift_fraction` | drift in free air | {100 * _l.force_drift_fraction:g} % | ForceWatch | after the lift | no success |
+| `OVERSHOOT` | force before the slide | {100 * OVERSHOOT:g} % above the wanted | OvershootWatch | 3 steps | lift |
+| `HARD, LATE_S` | force after the first touch | {HARD:g} impacts; {1e3 * LATE_S:g} ms | ForceLoop | delay + {LATE_S + 2 * HALF_S:g} s | lift |
+| `peak_force_fraction` | force in the slide | {100 * _t.peak_force_fraction:g} % above the wanted | SlideWatch | 3 steps | no window |
+| `peak_speed_fraction` | speed in the slide | {100 * _t.peak_speed_fraction:g} % above the wanted | SlideWatch | 50 ms | no window |
+| `lost_contact_s` | time without contact | {_t.lost_contact_s:g} s | ContactWatch | each step, 10 ms | lift |
+| `stall_s` | way by commanded way | {100 * _t.stall_speed_fraction:g} % in {_t.stall_s:g} s | StallWatch | {_t.stall_s:g} s | lift |
+| `MOST_FORCE_SHARE` | change of the force in a rise | {100 * MOST_FORCE_SHARE:g} % of force_limit_n | Rise | each step, 10 ms | go back |
+| `approach_travel_m` | way down in search | {1e3 * _t.approach_travel_m:g} mm | ApproachStage | each step, 10 ms | lift |
+| `approach_timeout_s, …` | time of a stage | {', '.join(f'{one:g}' for one in (_l.approach_timeout_s, *_timeouts))} s | Stage | each step, 10 ms | lift |
+| `command_speed_m_s, …` | a single command | {_c.command_speed_m_s:g} m/s, {_c.command_normal_m_s:g} m/s, {_c.command_force_n:g} N | arm | at once | refused, stop |
+""".replace('-', '−')  # noqa: E501  # a row is a line

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -37,49 +36,49 @@ class SurfacePath(Protocol):
         """Return the direction of travel from +x towards +y."""
 
 
-class Follower(Protocol):
-    """Steers the finger along the surface, for the stages of a slide."""
+class Follower:
+    """Steers the finger along the surface, for the stages of a slide; a base of all followers.
 
-    length_m: float  # of the part at constant speed
-    travelled_m: float
+    `length_m` is the length of the part at constant speed, `travelled_m` the way until now.
+    """
 
-    @property
-    def direction_rad(self) -> float:
-        """Present direction of travel."""
+    def __init__(self, length_m: float) -> None:
+        self.length_m = length_m
+        self.travelled_m = 0.0
 
     @property
     def steady_m(self) -> float:
         """How far from here speed and force can be kept."""
+        return math.inf
+
+    @property
+    def direction_rad(self) -> float:
+        """Present direction of travel."""
+        raise NotImplementedError
 
     def begin_slide(self) -> None:
         """Mark the start of the slide after the ramp."""
 
     def update(self, time_ns: int, arm: ArmState) -> None:
         """Update the position of the finger."""
+        raise NotImplementedError
 
     def velocity(self, speed_m_s: float) -> tuple[float, float]:
         """Return the velocity to command for a speed, m/s."""
+        raise NotImplementedError
 
 
-class PathFollower:
+class PathFollower(Follower):
     """Keep track of how far the finger has travelled on a path, and steer it along.
 
-    The direction is that of the path where the finger will be in the middle of the next step: age of the state, lag
-    of the arm and half a step ahead. The remaining distance to the path is corrected at constant speed.
-
-    Parameters
-    ----------
-    path
-        It begins where the finger is at the first update.
-    arm_lag_s
-        How long the arm takes to follow a command.
+    The path begins where the finger is at the first update. The direction is that of the path where the finger will be
+    in the middle of the next step: age of the state, lag of the arm (`arm_lag_s` after a command) and half a step
+    ahead. The remaining distance to the path is corrected at constant speed.
     """
 
     def __init__(self, path: SurfacePath, arm_lag_s: float = 0.0) -> None:
+        super().__init__(path.length_m)
         self.path = path
-        self.length_m = path.length_m
-        self.travelled_m = 0.0
-        self.steady_m = math.inf
         self._arm_lag_s = arm_lag_s
         self._age_s = 0.0
         self._across_m = 0.0
@@ -89,9 +88,6 @@ class PathFollower:
     def direction_rad(self) -> float:
         """Present direction of travel."""
         return self.path.direction_rad(self.travelled_m)
-
-    def begin_slide(self) -> None:
-        """Change nothing: one path serves the ramp and the slide."""
 
     def update(self, time_ns: int, arm: ArmState) -> None:
         """Project the finger on the path: so noise of the position does not add up."""
@@ -200,29 +196,22 @@ class CircularPath(NamedTuple):
 # --------------------
 # To and fro on a line, as a fingertip rubs.
 
-LEAST_FRACTION = 0.5  # of the longest stroke: the shortest random stroke
-# (whether the next stroke goes forth, where it begins, m) -> where it ends, m
-StrokeEnds = Callable[[bool, float], float]
+
+class StrokeEnds(NamedTuple):
+    """Where strokes within 0 to `longest_m` end: drawn at each turn, so that each is at least `least_m` long."""
+
+    longest_m: float
+    least_m: float
+    rng: np.random.Generator
+
+    def draw(self, forth: bool, begin_m: float) -> float:
+        """Return where the next stroke ends, m."""
+        low, high = (begin_m + self.least_m, self.longest_m) if forth else (0.0, begin_m - self.least_m)
+        return float(self.rng.uniform(low, max(low, high)))
 
 
-def whole_strokes(stroke_m: float) -> StrokeEnds:
-    """Return the ends of strokes that are all `stroke_m` long."""
-    return lambda forth, _begin_m: stroke_m if forth else 0.0
-
-
-def random_strokes(longest_m: float, rng: np.random.Generator) -> StrokeEnds:
-    """Return ends that are drawn at each turn: strokes of at least half of the longest, within 0 to `longest_m`."""
-    least_m = LEAST_FRACTION * longest_m
-
-    def end_of(forth: bool, begin_m: float) -> float:
-        low, high = (begin_m + least_m, longest_m) if forth else (0.0, begin_m - least_m)
-        return float(rng.uniform(low, max(low, high)))
-
-    return end_of
-
-
-class Strokes:
-    """Steer a finger to and fro on a line; a `Follower`.
+class Strokes(Follower):
+    """Steer a finger to and fro on a line.
 
     A turn follows a cosine from full speed one way to full speed the other way, so the finger neither stops with a jolt
     nor rests. Arms follow late: when the finger is seen to move the other way, half of its turn is still to come,
@@ -230,15 +219,14 @@ class Strokes:
     """
 
     def __init__(self, heading_rad: float, ends: StrokeEnds, speed_m_s: float, turn_s: float, length_m: float) -> None:
-        self.length_m = length_m
-        self.travelled_m = 0.0
+        super().__init__(length_m)
         self._heading_rad = heading_rad
         self._speed_m_s = speed_m_s
         self._turn_s = turn_s
         self._ends = ends
         self._runs_on_m = speed_m_s * turn_s / math.pi  # until it stops: the integral of the cosine over half a turn
         self._forth = True
-        self._end_m = ends(True, 0.0)
+        self._end_m = ends.draw(True, 0.0)
         self._along_m = self._age_m = 0.0
         self._since_turn_s = math.inf  # since the newest turn began
         self._reversed_s = 0.0  # when, after that, the finger was seen to move the other way; inf until then
@@ -257,9 +245,6 @@ class Strokes:
         if self._since_turn_s < max(self._turn_s, self._reversed_s + 0.5 * self._turn_s + TURN_MARGIN_S):
             return 0.0
         return max(0.0, self._left_m - self._age_m - TURN_MARGIN_S * self._speed_m_s)
-
-    def begin_slide(self) -> None:
-        """Change nothing: the strokes continue."""
 
     def update(self, time_ns: int, arm: ArmState) -> None:
         """Update the position of the finger, and turn at the end of the stroke."""
@@ -288,7 +273,7 @@ class Strokes:
         if not self._turning and self._left_m < 0.0:
             self._forth = not self._forth
             self._since_turn_s, self._reversed_s = 0.0, math.inf
-            self._end_m = self._ends(self._forth, self._end_m)
+            self._end_m = self._ends.draw(self._forth, self._end_m)
 
     @property
     def _turning(self) -> bool:
@@ -307,16 +292,15 @@ class Strokes:
 QUARTER_RAD = 0.5 * math.pi
 
 
-class CrossLegs:
-    """Steer a finger along a straight leg, round a corner of 90 degrees, and along a second leg; a `Follower`.
+class CrossLegs(Follower):
+    """Steer a finger along a straight leg, round a corner of 90 degrees, and along a second leg.
 
     In the corner the speed stays and the direction follows a cosine, so the finger neither stops nor jolts. Nothing is
     guaranteed there, nor until the arm has become steady after it.
     """
 
     def __init__(self, heading_rad: float, leg_m: float, speed_m_s: float, corner_s: float, arm_lag_s: float) -> None:
-        self.travelled_m = 0.0
-        self.length_m = 2.0 * leg_m + speed_m_s * (corner_s + STEADY_S)
+        super().__init__(2.0 * leg_m + speed_m_s * (corner_s + STEADY_S))
         self._heading_rad = heading_rad
         self._leg_m = leg_m
         self._speed_m_s = speed_m_s

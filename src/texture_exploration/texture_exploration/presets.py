@@ -14,8 +14,8 @@ from __future__ import annotations
 import itertools
 import math
 import typing
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import Any
 
 from texture_core.config import find, find_file, load_yaml, safe_repr, unknown_name
 from texture_core.errors import InvalidParameter
@@ -29,30 +29,17 @@ LARGEST = 1e6  # number of a request; a larger one may not even be a float
 SHORTHANDS = ('direction_deg', 'slide_s')
 
 
-class Preset(NamedTuple):
-    """Content of a preset file."""
-
-    name: str
-    paper: str
-    requests: tuple[ExplorationRequest, ...]
-    repeats: int
-
-    def all(self, repeats: int = 0) -> list[ExplorationRequest]:
-        """Return all requests in turn, each combination once per round; `repeats` of 0 means that of the preset."""
-        return list(self.requests) * (repeats or self.repeats)
-
-
-def load_preset(name_or_path: str) -> Preset:
-    """Return a preset that the package ships (config/presets), or of a file."""
+def load_preset(name_or_path: str, repeats: int = 0) -> list[ExplorationRequest]:
+    """Return the requests of a preset that a package ships (config/presets), or of a file; raises as `read_preset`."""
     path = find_file(name_or_path, 'texture_exploration', 'config/presets', 'preset')
     content = load_yaml(path, 'preset')
     if not isinstance(content, Mapping):
         raise InvalidParameter(f"preset '{path.stem}': came {safe_repr(content)}; a mapping with a motion is needed")
-    return read_preset(content, path.stem)
+    return read_preset(content, path.stem, repeats)
 
 
-def read_preset(content: Mapping[str, Any], name: str) -> Preset:
-    """Return the preset in the content of a file; raises as `load_preset`."""
+def read_preset(content: Mapping[str, Any], name: str, repeats: int = 0) -> list[ExplorationRequest]:
+    """Return all requests in turn, each combination once per round; `repeats` of 0 means that of the preset."""
     where = f"preset '{name}'"
     vary = content.get('vary', {})
     if not isinstance(vary, Mapping):
@@ -63,18 +50,22 @@ def read_preset(content: Mapping[str, Any], name: str) -> Preset:
             raise InvalidParameter(f'{where}: {unknown_name(str(key), (*KEYS, *NUMBERS, *SHORTHANDS), "key")}')
     motion = str(content.get('motion', ''))
     find(MOTIONS, motion, 'motion')
-    repeats = content.get('repeats', 1)
-    if not isinstance(repeats, int) or not 1 <= repeats <= MOST:
-        raise InvalidParameter(f"{where}: 'repeats' is {safe_repr(repeats)}; a whole number from 1 to {MOST} is needed")
-    varied = [_sequence(key, values, where) for key, values in vary.items()]
-    combinations = math.prod(map(len, varied))
+    rounds = content.get('repeats', 1)
+    if not isinstance(rounds, int) or not 1 <= rounds <= MOST:
+        raise InvalidParameter(f"{where}: 'repeats' is {safe_repr(rounds)}; a whole number from 1 to {MOST} is needed")
+    for key, values in vary.items():
+        if not isinstance(values, list) or not values:
+            raise InvalidParameter(
+                f"{where}: 'vary' gives {safe_repr(values)} for '{key}'; a list of numbers is needed"
+            )
+    combinations = math.prod(map(len, vary.values()))
     if combinations > MOST:
         raise InvalidParameter(f"{where}: 'vary' makes {combinations} combinations; at most {MOST} are made")
     requests = [
         _request(motion, {**given, **dict(zip(vary, values, strict=True))}, where)
-        for values in itertools.product(*varied)
+        for values in itertools.product(*vary.values())
     ]
-    return Preset(name, str(content.get('paper', '')), tuple(requests), repeats)
+    return requests * (repeats or rounds)
 
 
 def _request(motion: str, numbers: Mapping[str, Any], where: str) -> ExplorationRequest:
@@ -91,9 +82,3 @@ def _request(motion: str, numbers: Mapping[str, Any], where: str) -> Exploration
             raise InvalidParameter(f"{where}: 'slide_s' needs 'speed_m_s', from which the distance follows")
         values['distance_m'] = values['speed_m_s'] * numbers['slide_s']
     return ExplorationRequest(motion, use_start=bool({'start_x_m', 'start_y_m'} & values.keys()), **values)
-
-
-def _sequence(key: str, values: Any, where: str) -> Sequence[Any]:
-    if not isinstance(values, list) or not values:
-        raise InvalidParameter(f"{where}: 'vary' gives {safe_repr(values)} for '{key}'; a list of numbers is needed")
-    return values

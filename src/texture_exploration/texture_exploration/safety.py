@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 from texture_core.config import param
 from texture_core.errors import CommandRefused, ExplorationError, InvalidParameter, MotionRefused
@@ -40,11 +40,6 @@ def shown(force_n: float) -> str:
     return f'{force_n:.2f}' if abs(force_n) <= MOST_FORCE_N else f'{force_n:.3g}'
 
 
-def stated(given: float, value: float) -> str:
-    """Return a number of a request as text; a `given` of 0 means the default of the motion."""
-    return f'{value:g}' if given else f'{value:g} (the default of the motion)'
-
-
 def _edge(value: float, which: str) -> Any:
     """Declare an edge of the workspace."""
     text = f'{which} coordinate of the workspace in the surface frame; leaving it aborts.'
@@ -56,42 +51,22 @@ class SafetyLimits:
     """Limits of requests, of measurements and of the duration of each phase."""
 
     max_speed_m_s: float = param(
-        0.25,
-        'Highest speed that may be requested; faster requests are refused.',
-        unit='m/s',
-        low=1e-4,
-        high=1.0,
+        0.25, 'Highest speed that may be requested; a faster one is refused.', unit='m/s', low=1e-4, high=1.0
     )
     min_force_n: float = param(
-        0.1, 'Lowest normal force that may be requested; smaller forces are refused.', unit='N', low=0.01
+        0.1, 'Lowest normal force that may be requested; a smaller one is refused.', unit='N', low=0.01
     )
     max_force_n: float = param(
-        6.0,
-        'Highest normal force that may be requested; larger forces are refused.',
-        unit='N',
-        low=0.01,
-        high=50.0,
+        6.0, 'Highest normal force that may be requested; a larger one is refused.', unit='N', low=0.01, high=50.0
     )
     force_limit_n: float = param(
-        10.0,
-        'Measured force, in any direction, above which an exploration is aborted.',
-        unit='N',
-        low=0.1,
-        high=100.0,
+        10.0, 'Measured force, in any direction, above which an exploration aborts.', unit='N', low=0.1, high=100.0
     )
     friction_limit: float = param(
-        2.0,
-        'Highest force along the surface, as a multiple of the normal force, above which an exploration is '
-        'aborted; it must exceed the friction of finger and samples.',
-        low=0.1,
-        high=20.0,
+        2.0, 'Force along the surface, by the normal force, that aborts; it must exceed friction.', low=0.1, high=20.0
     )
     tangential_floor_n: float = param(
-        1.0,
-        'Force along the surface that is allowed beyond friction; it must exceed the noise of the force sensor.',
-        unit='N',
-        low=0.05,
-        high=20.0,
+        1.0, 'Force along the surface allowed beyond friction; above all noise.', unit='N', low=0.05, high=20.0
     )
     frozen_force_s = 0.06  # of a reading that stays the same where it should change: six states at 100 Hz
     force_drift_fraction = 0.3  # of the wanted force, that the force in free air may change over an exploration
@@ -103,23 +78,12 @@ class SafetyLimits:
     z_low_m: float = _edge(-0.02, 'Lowest z')
     z_high_m: float = _edge(0.2, 'Highest z')
     surface_tolerance_m: float = param(
-        0.02,
-        'Largest distance of a contact from the declared surface, upwards or downwards; a contact farther away aborts. '
-        'An arm without a base frame has no declared surface.',
-        unit='m',
-        low=0.001,
-        high=0.5,
+        0.02, 'Largest height of a contact above or below the declared surface.', unit='m', low=0.001, high=0.5
     )
     state_timeout_s: float = param(
-        0.13,
-        'Age of the newest arm state above which an exploration is aborted; a longer time notices a dead arm later.',
-        unit='s',
-        low=0.01,
-        high=2.0,
+        0.13, 'Age of the newest state of the arm that aborts.', unit='s', low=0.01, high=2.0
     )
-    approach_timeout_s: float = param(
-        10.0, 'How long the approach to the surface may take before the exploration is aborted.', unit='s', low=0.1
-    )
+    approach_timeout_s: float = param(10.0, 'How long the approach to the surface may take.', unit='s', low=0.1)
     contact_timeout_s = 10.0  # that force and speed may take to settle: a contact 30 times softer than declared
     slide_overtime_s = 2.0  # longer than planned, that a slide may take
     lift_timeout_s = 5.0  # that braking and lifting may take: three times what they do
@@ -157,23 +121,16 @@ class SafetyLimits:
         return min(max(value, low), high)
 
     def complete(self, request: ExplorationRequest, defaults: Mapping[str, float]) -> ExplorationRequest:
-        """Return a request with the motion's defaults for those of its numbers that are 0.
-
-        Raises
-        ------
-        MotionRefused
-            If a number is out of its range, or belongs to another motion.
-        """
+        """Return a request with the motion's defaults for those of its numbers that are 0, or refuse it."""
         numbers: dict[str, Any] = {
             name: getattr(request, name) or self.default(name, value) for name, value in defaults.items()
         }
-        given, request = request, replace(request, **numbers)
-        for name in defaults:
-            value, (low, high, unit) = getattr(request, name), self.range(name)
+        request = replace(request, **numbers)
+        for name, value in numbers.items():
+            low, high, unit = self.range(name)
             if not low <= value <= high:
-                shown = stated(getattr(given, name), value)
                 raise MotionRefused(
-                    f'{request.motion}: {name} is {shown}; allowed is {low:g} to {high:g} {unit}', field=name
+                    f'{request.motion}: {name} is {value:g}; allowed is {low:g} to {high:g} {unit}', field=name
                 )
         self.refuse_unused(request, RANGES.keys() - defaults.keys())
         if not abs(request.direction_rad) <= MAX_DIRECTION_RAD:
@@ -185,13 +142,7 @@ class SafetyLimits:
 
     @staticmethod
     def refuse_unused(request: ExplorationRequest, names: Iterable[str]) -> None:
-        """Refuse a request with a number that the motion does not use: it means another motion.
-
-        Raises
-        ------
-        MotionRefused
-            If such a number is not 0.
-        """
+        """Refuse a request with a number that the motion does not use: it means another motion."""
         given = sorted(name for name in names if getattr(request, name) != 0.0)
         if given:
             raise MotionRefused(
@@ -247,11 +198,6 @@ class SafetyLimits:
             f'under {normal_n:.2f} N: the finger met something, or its force is given in another frame; see '
             "'friction_limit' and 'tangential_floor_n'"
         )
-
-    def workspace_violation(self, arm: ArmState) -> str:
-        """Return in a sentence where the finger has left the workspace, '' if it has not."""
-        outside = self.outside(arm.position)
-        return f'the finger left the workspace: {outside}' if outside else ''
 
     def outside(self, position: Vector) -> str:
         """Return as text along which axes a position in the surface frame, m, is outside the workspace, or ''."""
@@ -356,54 +302,3 @@ class SurfacePatch:
             y_low_m=max(limits.y_low_m, self.patch_y_low_m),
             y_high_m=min(limits.y_high_m, self.patch_y_high_m),
         )
-
-
-# --------------------
-# All limits, once: docs/motion.md shows them.
-
-
-class Limit(NamedTuple):
-    """One limit: quantity, value, checking part, reaction time and consequence."""
-
-    name: str
-    quantity: str
-    value: str
-    checks: str
-    soon: str
-    follows: str
-
-
-EVERY_STEP = 'each step, 10 ms'
-
-
-LIMITS: tuple[Limit, ...] = (
-    Limit(
-        'MOST_FORCE_N, MOST_M', 'number of a sample', 'finite, 10 kN, 100 m', 'arm and Exploration', 'at once', 'lift'
-    ),
-    Limit('force_limit_n', 'force in any direction', '10 N', 'ForceGuard', EVERY_STEP, 'way back, lift'),
-    Limit(
-        'WALL_SHARE', 'force at a wall, foreseen', '4.5 × force_limit_n', 'Exploration', 'before it moves', 'refused'
-    ),
-    Limit('friction_limit', 'force along the surface', '2 × normal + 1 N', 'ForceGuard', EVERY_STEP, 'way back, lift'),
-    Limit('x_low_m to z_high_m', 'place', '±0.2 m; −0.02 to 0.2 m', 'Exploration', EVERY_STEP, 'lift'),
-    Limit('surface_tolerance_m', 'height of the contact', '20 mm', 'Exploration', EVERY_STEP, 'lift'),
-    Limit('state_timeout_s', 'age of the state', '0.13 s', 'Exploration', EVERY_STEP, 'stop'),
-    Limit('signal_timeout_s', 'silence of the sensor', '0.5 s', 'SignalWatch', EVERY_STEP, 'lift'),
-    Limit('frozen_force_s', 'force that repeats', '0.06 s', 'ForceWatch', EVERY_STEP, 'lift'),
-    Limit('force_drift_fraction', 'drift in free air', '30 %', 'ForceWatch', 'after the lift', 'no success'),
-    Limit('OVERSHOOT', 'force before the slide', '20 % above the wanted', 'OvershootWatch', '3 steps', 'lift'),
-    Limit('HARD, LATE_S', 'force after the first touch', '2 impacts; 30 ms', 'ForceLoop', 'delay + 0.13 s', 'lift'),
-    Limit('peak_force_fraction', 'force in the slide', '50 % above the wanted', 'SlideWatch', '3 steps', 'no window'),
-    Limit('peak_speed_fraction', 'speed in the slide', '50 % above the wanted', 'SlideWatch', '50 ms', 'no window'),
-    Limit('lost_contact_s', 'time without contact', '0.1 s', 'ContactWatch', EVERY_STEP, 'lift'),
-    Limit('stall_s', 'way by commanded way', '25 % in 0.25 s', 'StallWatch', '0.25 s', 'lift'),
-    Limit('MOST_FORCE_SHARE', 'change of the force in a rise', '65 % of force_limit_n', 'Rise', EVERY_STEP, 'go back'),
-    Limit('approach_travel_m', 'way down in search', '50 mm', 'ApproachStage', EVERY_STEP, 'lift'),
-    Limit('approach_timeout_s, …', 'time of a stage', '10, 10, 2, 5 s', 'Stage', EVERY_STEP, 'lift'),
-    Limit('command_speed_m_s, …', 'a single command', '1 m/s, 0.5 m/s, 50 N', 'arm', 'at once', 'refused, stop'),
-)
-
-
-def limit_table() -> str:
-    """Return the limits as rows of a table."""
-    return '\n'.join(f'| `{row.name}` | {" | ".join(row[1:])} |' for row in LIMITS)

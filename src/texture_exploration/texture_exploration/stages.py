@@ -42,11 +42,11 @@ class Stage:
         self.timeout_s = timeout_s
         self.goal = goal
         self.steady_s = 0.0
-        self._begin_ns = 0
+        self._begin_ns, self._begin_m = 0, 0.0
 
     def begin(self, time_ns: int, arm: ArmState) -> None:
-        """Note time and place of the start."""
-        self._begin_ns = time_ns
+        """Note time and height of the start."""
+        self._begin_ns, self._begin_m = time_ns, arm.position[2]
 
     def elapsed_s(self, time_ns: int) -> float:
         """Return the time since the start."""
@@ -55,12 +55,6 @@ class Stage:
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Return the command, None when the stage is over; MotionAborted if its goal cannot be reached."""
         raise NotImplementedError
-
-    def see(self, arm: ArmState) -> None:
-        """Note a state after the end."""
-
-    def watch_anew(self) -> None:
-        """Discard the forces until now: another part commanded the arm."""
 
     def timed_step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Return the command; MotionAborted also if the stage takes too long."""
@@ -121,19 +115,13 @@ class ApproachStage(Stage):
         self._touch = touch
         self._limits = limits
         self._force_n = force_n
-        self._start_m = 0.0
-
-    def begin(self, time_ns: int, arm: ArmState) -> None:
-        """Note the height at the start."""
-        super().begin(time_ns, arm)
-        self._start_m = arm.position[2]
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Go down, but no further than allowed."""
         if not arm.force_size_n <= self._touch.contact_force_n:
             self._check_normal(arm)
             return None
-        if self._start_m - arm.position[2] > self._touch.approach_travel_m:
+        if self._begin_m - arm.position[2] > self._touch.approach_travel_m:
             raise MotionAborted(
                 f'no surface within {self._touch.approach_travel_m:g} m below the start; '
                 "bring the finger closer or raise 'approach_travel_m'",
@@ -230,20 +218,14 @@ class AccelerateStage(Stage):
         self._overshoot.update(arm)
         self._along.follower.update(time_ns, arm)
         self._along.contact.update(arm)
-        elapsed_s = self.elapsed_s(time_ns)
-        if elapsed_s >= self._along.ramp_s + STEADY_S and self._reached(arm):
-            return None
-        speed = self._along.speed_m_s * smooth(elapsed_s / self._along.ramp_s)
-        return ArmCommand(self._along.follower.velocity(speed), force_n=self._along.force_n)
-
-    def _reached(self, arm: ArmState) -> bool:
-        speed = math.hypot(*arm.velocity[:2])
-        fast = abs(speed - self._along.speed_m_s) <= self._along.touch.speed_tolerance * self._along.speed_m_s
+        elapsed_s, speed_m_s, force_n = self.elapsed_s(time_ns), self._along.speed_m_s, self._along.force_n
+        fast = abs(math.hypot(*arm.velocity[:2]) - speed_m_s) <= self._along.touch.speed_tolerance * speed_m_s
         # Sliding makes the force fluctuate: twice the tolerance of the finger at rest.
-        return (
-            fast
-            and abs(arm.force_n - self._along.force_n) <= 2 * self._along.touch.force_tolerance * self._along.force_n
-        )
+        presses = abs(arm.force_n - force_n) <= 2 * self._along.touch.force_tolerance * force_n
+        if elapsed_s >= self._along.ramp_s + STEADY_S and fast and presses:
+            return None
+        speed = speed_m_s * smooth(elapsed_s / self._along.ramp_s)
+        return ArmCommand(self._along.follower.velocity(speed), force_n=force_n)
 
 
 class SlideStage(Stage):
@@ -260,23 +242,14 @@ class SlideStage(Stage):
         self._watch = SlideWatch(along.speed_m_s, along.force_n, along.touch)
         self._start_m = 0.0
         self._steady_until_ns = 0
-        self._finish = False
+        self.finishing = False  # it ends as soon as the guaranteed time is over
         self.progress = 0.0
-
-    @property
-    def direction_rad(self) -> float:
-        """Present direction of travel."""
-        return self.along.follower.direction_rad
 
     def begin(self, time_ns: int, arm: ArmState) -> None:
         """The slide counts from here."""
         super().begin(time_ns, arm)
         self._start_m = self.along.follower.travelled_m
         self.along.follower.begin_slide()
-
-    def finish(self) -> None:
-        """End as soon as the guaranteed time is over."""
-        self._finish = True
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Keep on sliding, and update the guaranteed time: 0 without contact, or off the requested speed and force."""
@@ -304,7 +277,7 @@ class SlideStage(Stage):
         length_m = self.along.follower.length_m
         self.progress = min(1.0, slid_m / length_m)
         by_length = (length_m - slid_m) / self.along.speed_m_s
-        return min(by_length, (self._steady_until_ns - time_ns) * 1e-9) if self._finish else by_length
+        return min(by_length, (self._steady_until_ns - time_ns) * 1e-9) if self.finishing else by_length
 
 
 class BrakeStage(Stage):
@@ -330,7 +303,14 @@ class BrakeStage(Stage):
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Follow the ramp down."""
         self._along.follower.update(time_ns, arm)
-        touching = self._touches(arm)
+        touching = True  # a contact that was lost in the slide may come back: keep pressing
+        if not self._whole:
+            self._along.contact.update(arm)
+            self._whole = self._along.contact.touching
+        else:
+            with suppress(ContactLost):
+                self._along.contact.update(arm)
+            touching = self._along.contact.touching
         fraction = self.elapsed_s(time_ns) / self._along.ramp_s
         if fraction >= 1.0:
             if not self._whole:
@@ -338,15 +318,6 @@ class BrakeStage(Stage):
             return None
         velocity = self._along.follower.velocity(self._along.speed_m_s * smooth(1.0 - fraction))
         return ArmCommand(velocity, force_n=self._along.force_n if touching else None)
-
-    def _touches(self, arm: ArmState) -> bool:
-        if not self._whole:
-            self._along.contact.update(arm)
-            self._whole = self._along.contact.touching
-            return True  # may come back: keep pressing
-        with suppress(ContactLost):
-            self._along.contact.update(arm)
-        return self._along.contact.touching
 
 
 class LiftStage(Stage):

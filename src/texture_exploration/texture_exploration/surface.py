@@ -18,7 +18,6 @@ MAKE_A_PLANE = 3
 TOUCHES = 4  # three are always in a plane: only a further one verifies it
 NARROWEST_M = 0.01  # spread of the touches across their longest direction, and distance between any two
 LARGEST_RESIDUAL_M = 0.002  # a surface that is bent more than this is no plane
-EDGES = (np.min, np.max)
 LARGEST_TURN_RAD = math.radians(15.0)  # against the pose before: beyond, a touch is more likely wrong than the pose
 
 
@@ -38,14 +37,12 @@ class SurfaceFit(NamedTuple):
 def fit_surface(
     touches: Sequence[Sequence[float] | Array], normal: Sequence[float], along: Sequence[float]
 ) -> SurfaceFit:
-    """Return the plane that fits touches best, by least squares of the distances (total least squares).
+    """Return the plane that fits at least three touches best, by least squares of the distances (total least squares).
 
     The origin is the middle of the touches, z the normal, x the direction `along` the surface, projected on the
     plane.
     """
     points = np.array(touches, dtype=float)
-    if len(points) < MAKE_A_PLANE:
-        raise InvalidData(f'there are {len(points)} touches; {MAKE_A_PLANE} are needed')
     middle = points.mean(axis=0)
     _, _sizes, directions = np.linalg.svd(points - middle, full_matrices=False)
     spread_m = float(np.ptp((points - middle) @ directions[1]))
@@ -76,8 +73,8 @@ def fit_surface(
     length = float(np.linalg.norm(x_axis))
     axes = np.column_stack([x_axis / length, np.cross(up, x_axis / length), up])
     pose = (*middle.tolist(), *rotation_vector(axes).tolist())
-    (x_low, y_low), (x_high, y_high) = (edge(np.round((points - middle) @ axes[:, :2], 5), axis=0) for edge in EDGES)
-    patch = SurfacePatch(float(x_low), float(x_high), float(y_low), float(y_high))
+    x_m, y_m = np.round((points - middle) @ axes[:, :2], 5).T.tolist()
+    patch = SurfacePatch(min(x_m), max(x_m), min(y_m), max(y_m))
     return SurfaceFit(pose, float(np.sqrt(np.mean(distances**2))), largest_m, patch)
 
 

@@ -25,104 +25,56 @@ def stop_s(delay_s: float) -> float:
 
 @dataclass(frozen=True)
 class TouchParams:
-    """Parameters of approach, contact, acceleration and lift."""
+    """Parameters of approach, contact, acceleration and lift; states beyond a peak are not steady."""
 
     travel_speed_m_s: float = param(
-        0.05,
-        'Highest speed above the surface on the way back to the start; a stiff contact may ask for a lower one.',
-        unit='m/s',
-        low=0.01,
-        high=1.0,
+        0.05, 'Highest speed on the way to the start; lower for a stiff contact.', unit='m/s', low=0.01, high=1.0
     )
     approach_speed_m_s: float = param(
-        0.02,
-        'Highest speed towards the surface; the wanted force may ask for a lower one.',
-        unit='m/s',
-        low=0.001,
-        high=0.1,
+        0.02, 'Highest speed towards the surface; lower for a small force.', unit='m/s', low=0.001, high=0.1
     )
     approach_stiffness_n_m: float = param(
         2000.0,
-        'Stiffest contact that is expected, also from the side; larger values lower the approach speed, so that the '
-        'impact stays below the wanted force, and the highest speed of a slide.',
+        'Stiffest contact that is expected, also from the side; a larger one lowers the speeds of approach, travel and '
+        'slide, so that the impact stays below its limit.',
         unit='N/m',
         low=10.0,
         high=200000.0,
     )
     approach_travel_m: float = param(
-        0.05,
-        'How far the finger comes down in search of the surface before the motion is aborted.',
-        unit='m',
-        low=0.001,
-        high=0.5,
+        0.05, 'Longest way down in search of the surface; then it aborts.', unit='m', low=0.001, high=0.5
     )
     unheard_force_fraction = 1.5  # of the wanted force, that an arm may reach until its watchdog stops it
     contact_force_n: float = param(
-        0.2,
-        'Force above which the finger counts as in contact; a larger force needs a harder touch.',
-        unit='N',
-        low=0.02,
-        high=5.0,
+        0.2, 'Force above which the finger counts as in contact; larger: a harder touch.', unit='N', low=0.02, high=5.0
     )
     force_tolerance: float = param(
-        0.1,
-        'Fraction of the wanted force within which the force has settled; a larger fraction settles sooner.',
-        low=0.01,
-        high=0.5,
+        0.1, 'Fraction of the wanted force within which it has settled; larger: sooner.', low=0.01, high=0.5
     )
     speed_tolerance: float = param(
-        0.05,
-        'Fraction of the wanted speed within which the speed is reached; a larger fraction starts the slide sooner.',
-        low=0.005,
-        high=0.5,
+        0.05, 'Fraction of the wanted speed within which it is reached; larger: sooner.', low=0.005, high=0.5
     )
     settle_s = 0.1  # that the force must stay within its tolerance before the finger slides
     acceleration_m_s2: float = param(
-        1.0,
-        'Highest tangential acceleration; larger values shorten the ramps before and after a slide.',
-        unit='m/s²',
-        low=0.05,
-        high=10.0,
+        1.0, 'Highest acceleration along the surface; larger: shorter ramps.', unit='m/s²', low=0.05, high=10.0
     )
     jerk_m_s3 = 50.0  # along the surface: ramps of 0.1 s up to 0.05 m/s
     arm_lag_s = 0.005  # after which an arm follows a command: the direction on a curved path is led by it
     lost_force_fraction = 0.25  # of the wanted force, below which contact counts as lost
     lost_contact_s: float = param(
-        0.1,
-        'How long contact may be lost before the slide ends; shorter gaps are bounces on a rough surface.',
-        unit='s',
-        low=0.02,
-        high=5.0,
+        0.1, 'Loss of contact that aborts a slide; shorter ones are bounces.', unit='s', low=0.02, high=5.0
     )
     stall_speed_fraction = 0.25  # of the commanded way, below which a sliding finger counts as stalled
-    stall_s: float = param(
-        0.25,
-        'Time over which the commanded way and that of the finger are compared during a slide; a longer time '
-        'notices a stall later.',
-        unit='s',
-        low=0.05,
-        high=5.0,
-    )
+    stall_s = 0.25  # over which the commanded way and that of a sliding finger are compared
     mean_force_fraction = 0.3  # error of the mean force with which a slide succeeds
     peak_force_fraction: float = param(
-        0.5,
-        'By which fraction of the wanted force a slide may be pressed harder for a moment and succeed; states beyond '
-        'it are not steady. A larger fraction bears a rougher surface.',
-        low=0.05,
-        high=20.0,
+        0.5, 'Fraction by which a slide may exceed its force for a moment and succeed.', low=0.05, high=20.0
     )
     mean_speed_fraction: float = param(
-        0.2,
-        'Largest relative error of the mean speed with which a slide succeeds.',
-        low=0.02,
-        high=5.0,
+        0.2, 'Largest error of the mean speed, as a fraction, of a slide that succeeds.', low=0.02, high=5.0
     )
     peak_speed_fraction: float = param(
-        0.5,
-        'By which fraction of the wanted speed the finger may be faster for 50 ms in a slide that succeeds; states '
-        'beyond it are not steady.',
-        low=0.05,
-        high=20.0,
+        0.5, 'Fraction by which a slide may exceed its speed for 50 ms and succeed.', low=0.05, high=20.0
     )
     mean_friction = 2.0  # mean force along the surface by wanted force, of a slide that succeeds
     peak_friction = 3.0  # the same for 50 ms; states beyond it are not steady
@@ -133,14 +85,8 @@ class TouchParams:
         """Return how fast the finger may come down to press with a force.
 
         An arm that loses its commands at the moment of contact keeps moving until its watchdog stops it. Until then
-        the force stays below `unheard_force_fraction` of the wanted one on a contact of `approach_stiffness_n_m`.
-
-        Parameters
-        ----------
-        force_n
-            The wanted force.
-        watchdog_s, delay_s
-            See `texture_exploration.arms.arm.ArmState`.
+        the force stays below `unheard_force_fraction` of the wanted one on a contact of `approach_stiffness_n_m`. For
+        `watchdog_s` and `delay_s` see `texture_exploration.arms.arm.ArmState`.
         """
         heard_m_s = stopping_m_s(IMPACT * force_n, self.approach_stiffness_n_m, stop_s(delay_s))
         allowed_n, unheard_s = max(self.unheard_force_fraction * force_n, HARMLESS_N), watchdog_s + REACTION_S

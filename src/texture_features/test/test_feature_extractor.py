@@ -42,16 +42,11 @@ class Bench:
     def features(self):
         return [from_msg(message) for message in self._features]
 
-    def play_all(self, batches):
-        by_time = sorted(((batch.stamp_ns, topic, batch) for topic in batches for batch in batches[topic]),
-                         key=lambda item: item[:2])  # fmt: skip
-        for _, topic, batch in by_time:
-            self.of_topics[topic].publish(to_msg(batch))
-            self.graph.spin_once(0.02)
-
     def play(self, batches):
-        for batch in batches:
-            self.signals.publish(to_msg(batch))
+        """Publish the batches of each topic in the order of time."""
+        pairs = [(topic, batch) for topic in batches for batch in batches[topic]]
+        for topic, batch in sorted(pairs, key=lambda pair: pair[1].stamp_ns):
+            self.of_topics[topic].publish(to_msg(batch))
             self.graph.spin_once(0.02)
 
 
@@ -61,20 +56,13 @@ def bench():
         yield Bench(graph)
 
 
-def recording(seconds=1.0):
-    samples = np.random.default_rng(0).normal(size=(round(seconds * RATE_HZ), 1)).astype(np.float32)
+def recording(seconds=1.0, rate_hz=RATE_HZ, channels=('c',), begin_s=0.0, seed=0):
+    samples = np.random.default_rng(seed).normal(size=(round(seconds * rate_hz), len(channels))).astype(np.float32)
+    begin_ns, step = NANOSECONDS + round(begin_s * NANOSECONDS), round(rate_hz / 10)
+    parts = [(first, samples[first : first + step]) for first in range(0, len(samples), step)]
     return [
-        TactileSignal(
-            NANOSECONDS + round(first / RATE_HZ * NANOSECONDS),
-            's',
-            ('c',),
-            (),
-            RATE_HZ,
-            first,
-            samples[first : first + 20],
-            'tip',
-        )
-        for first in range(0, len(samples), 20)
+        TactileSignal(begin_ns + round(first / rate_hz * NANOSECONDS), 's', channels, (), rate_hz, first, part, 'tip')
+        for first, part in parts
     ]
 
 
@@ -89,7 +77,7 @@ def lift(at_s=0.8):
 def test_the_node_publishes_what_the_same_recording_gives_offline(bench):
     bench.states.publish(to_msg(slide()))
     bench.until(lambda: bench.node._cutter._slides)
-    bench.play(recording())
+    bench.play({'signal': recording()})
     bench.until(lambda: len(bench.features) == 4)
     bench.states.publish(to_msg(lift()))
     bench.until(lambda: bench.features and bench.features[-1].last)
@@ -98,11 +86,8 @@ def test_the_node_publishes_what_the_same_recording_gives_offline(bench):
     events = cut_recording({'signal': recording()}, [slide(), lift()], feature_set.windows)
     for received, expected in zip(bench.features, map(feature_set.extract, events), strict=True):
         np.testing.assert_array_equal(received.values, expected.values)
-        assert (received.start_ns, received.names, received.feature_set) == (
-            expected.start_ns,
-            expected.names,
-            expected.feature_set,
-        )
+        for name in ('start_ns', 'names', 'feature_set'):
+            assert getattr(received, name) == getattr(expected, name)
 
 
 def test_a_slide_whose_sensor_died_ends_all_the_same(bench):
@@ -120,7 +105,7 @@ def test_broken_messages_are_counted_and_survived(bench):
     bench.until(lambda: bench.node._invalid == 2)
     bench.states.publish(to_msg(slide()))
     bench.until(lambda: bench.node._cutter._slides)
-    bench.play(recording())
+    bench.play({'signal': recording()})
     bench.until(lambda: len(bench.features) == 4)
 
 
@@ -136,35 +121,19 @@ def test_known_losses_are_counted_and_those_of_a_restart_named_as_unknown(bench)
 FINGERS = ('finger0/signal', 'finger0/signal_static', 'finger1/signal', 'finger1/signal_static')
 
 
-def finger_batches(topic, seconds, late_s, seed):
-    """Return what one finger publishes: PAC at 2.2 kHz or slow channels at 100 Hz, from `late_s` on."""
-    rate_hz, channels = (2200.0, ('pac',)) if topic.endswith('signal') else (100.0, ('tdc', 'tac', 'electrode1'))
-    begin_ns = NANOSECONDS + round(late_s * NANOSECONDS)
-    count = round((seconds - late_s) * rate_hz)
-    samples = np.random.default_rng(seed).normal(size=(count, len(channels))).astype(np.float32)
-    step = round(rate_hz / 10)
-    return [
-        TactileSignal(
-            begin_ns + round(first / rate_hz * NANOSECONDS),
-            's',
-            channels,
-            (),
-            rate_hz,
-            first,
-            samples[first : first + step],
-        )
-        for first in range(0, count, step)
-    ]
-
-
 def test_two_fingers_are_joined_by_their_stamps_into_the_16_numbers_of_kaboli():
     with LocalGraph(69) as graph:
         bench = Bench(graph, recipe='kaboli-svm-two-fingers', topics=FINGERS)
         # the second finger's numbering begins later: only its stamps show which samples belong together
-        batches = {topic: finger_batches(topic, 3.0, 0.05 * ('1/' in topic), n) for n, topic in enumerate(FINGERS)}
+        kinds = {'signal': (2200.0, ('pac',)), 'signal_static': (100.0, ('tdc', 'tac', 'electrode1'))}
+        batches = {}
+        for number, topic in enumerate(FINGERS):
+            rate_hz, channels = kinds[topic.rpartition('/')[2]]
+            late_s = 0.05 * ('1/' in topic)
+            batches[topic] = recording(3.0 - late_s, rate_hz, channels, late_s, number)
         bench.states.publish(to_msg(slide(2.5)))
         bench.until(lambda: bench.node._cutter._slides)
-        bench.play_all(batches)
+        bench.play(batches)
         bench.until(lambda: len(bench.features) >= 5)
         received = bench.features[0]
     assert len(received.values) == 16
@@ -183,5 +152,6 @@ def test_a_recipe_that_sees_the_level_warns_of_a_sensor_that_is_not_tared_and_st
         bench = Bench(graph, recipe='taxels-any-day', topics=('signal_static',))
         for tared, expected in ((False, "expects 'signal_static' tared"), (True, 'extracting')):
             samples = np.zeros((10, 4), dtype=np.float32)
-            bench.play([TactileSignal(NANOSECONDS, 'skin', tuple('abcd'), (), 100.0, 0, samples, tared=tared)])
+            batch = TactileSignal(NANOSECONDS, 'skin', tuple('abcd'), (), 100.0, 0, samples, tared=tared)
+            bench.play({'signal_static': [batch]})
             bench.until(lambda: bench.reports and expected in bench.reports[-1].status[0].message)  # noqa: B023

@@ -108,6 +108,16 @@ def test_recipes_are_found_by_name_and_by_path(tmp_path):
         ({'inputs': {'signal': {'features': [{'log_bands': {'bands': 1}}]}}}, '2 to 512'),
         ({'inputs': {'signal': {'features': ['hjorth', 'hjorth']}}}, 'twice'),
         ({'inputs': {'signal': {'features': ['hjorth']}}, 'windows': {'length_s': 0}}, 'at least|0.005 to'),
+        ({'inputs': {'a': {'tare': 'maybe', 'features': ['hjorth']}}}, 'tare'),
+        ({'inputs': {'a+b': {'features': ['hjorth']}}}, "describes one input; list it under 'a'"),
+        ({'inputs': {'a+a': {'features': ['difference_correlation']}}}, 'each once'),
+        ({'inputs': {'a+': {'features': ['difference_correlation']}}}, 'each once'),
+        (
+            {'inputs': {'a+b': {'stretch_to_m_s': 0.1, 'features': ['texture_papers.kaboli:Correlation']}}},
+            'cannot be stretched',
+        ),
+        ({'inputs': {'a': {'stretch_to_m_s': -0.1, 'features': ['hjorth']}}}, 'at least 0'),
+        ({'inputs': {'a': {'stretch_to': 0.1, 'features': ['hjorth']}}}, "did you mean 'stretch_to_m_s'"),
     ],
 )
 def test_a_wrong_recipe_gets_one_sentence(recipe, sentence):
@@ -142,40 +152,26 @@ def test_one_input_is_described_twice_with_separate_features() -> None:
     assert {name.split('/')[1] for name in found if name.startswith('signal#2')} == {'hjorth', 'speed'}
 
 
-LAYOUT = ((100.0, ('a', 'b')),)
-
-
-def feature_set(tare: str = '') -> FeatureSet:
-    option = {'tare': tare} if tare else {}
-    return FeatureSet.from_mapping({'inputs': {'signal_static': {**option, 'features': ['mean']}}})
-
-
-def test_a_recipe_that_states_nothing_takes_any_signal() -> None:
-    assert feature_set().tare_faults({'signal_static': True}) == []
-    assert 'tare' not in feature_set().as_mapping()['inputs']['signal_static']
-
-
-@pytest.mark.parametrize(('tare', 'tared'), [('raw', False), ('tared', True)])
-def test_a_signal_as_the_recipe_states_is_no_fault(tare: str, tared: bool) -> None:
-    assert feature_set(tare).tare_faults({'signal_static': tared}) == []
-    assert feature_set(tare).tare_faults({}) == []  # nothing has come yet
-
-
-@pytest.mark.parametrize(('tare', 'tared', 'is_what'), [('tared', False, 'not subtracted'), ('raw', True, 'is sub')])
-def test_another_signal_is_reported_with_what_to_do(tare: str, tared: bool, is_what: str) -> None:
-    (fault,) = feature_set(tare).tare_faults({'signal_static': tared})
-    assert is_what in fault
-    assert 'subtract_baseline' in fault
-
-
-def test_the_statement_is_kept_in_the_recipe_and_does_not_change_the_features() -> None:
-    assert feature_set('raw').as_mapping()['inputs']['signal_static']['tare'] == 'raw'
-    assert feature_set('raw').fingerprint(LAYOUT) == feature_set().fingerprint(LAYOUT)
-
-
-def test_an_unknown_statement_is_refused() -> None:
-    with pytest.raises(InvalidParameter, match='tare'):
-        feature_set('maybe')
+@pytest.mark.parametrize(
+    ('tare', 'tared', 'words'),
+    [
+        ('', {'signal_static': True}, []),
+        ('raw', {'signal_static': False}, []),
+        ('tared', {'signal_static': True}, []),
+        ('tared', {}, []),  # nothing has come yet
+        ('tared', {'signal_static': False}, ['not subtracted', 'subtract_baseline']),
+        ('raw', {'signal_static': True}, ['is subtracted', 'subtract_baseline']),
+    ],
+)
+def test_a_signal_that_is_not_as_the_recipe_states_is_reported_and_no_other(tare, tared, words) -> None:
+    plain = {'inputs': {'signal_static': {'features': ['mean']}}}
+    feature_set = FeatureSet.from_mapping({'inputs': {'signal_static': {'tare': tare, 'features': ['mean']}}})
+    faults = feature_set.tare_faults(tared)
+    assert len(faults) == bool(words) and all(word in faults[0] for word in words)
+    # The statement is kept in the recipe, and changes no feature.
+    assert feature_set.as_mapping()['inputs']['signal_static'].get('tare', '') == tare
+    layout = ((100.0, ('a', 'b')),)
+    assert feature_set.fingerprint(layout) == FeatureSet.from_mapping(plain).fingerprint(layout)
 
 
 def window(**known: object) -> FeatureVector:

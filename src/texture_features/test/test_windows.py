@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import dataclasses
 import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -163,14 +164,14 @@ def test_an_hour_without_samples_is_passed_over_at_once_and_counted(begin_s, win
 
 def test_speed_and_force_are_means_over_the_window():
     states = [
-        state(0.0, speed_m_s=0.1, force_n=math.nan),
-        state(0.25, speed_m_s=0.2, force_n=2.0),
-        state(0.5, speed_m_s=9.0, force_n=9.0),
+        state(0.0, speed_m_s=0.1, force_n=math.nan, tangential_force_n=0.4),
+        state(0.25, speed_m_s=0.2, force_n=2.0, tangential_force_n=1.0),
+        state(0.5, speed_m_s=9.0, force_n=9.0, tangential_force_n=9.0),
         state(0.6, Phase.LIFT),
     ]
     window = run({'signal': stream(1.0)}, states)[0]
-    assert window.speed_m_s == pytest.approx(0.15)
-    assert window.force_n == pytest.approx(2.0)
+    assert (window.speed_m_s, window.force_n, window.tangential_force_n) == pytest.approx((0.15, 2.0, 0.7))
+    assert math.isnan(run({'signal': stream(1.0)}, [state(0.0, steady_s=0.6)])[0].tangential_force_n)
 
 
 def test_the_next_exploration_ends_one_that_was_never_ended():
@@ -238,21 +239,15 @@ def test_what_is_cut_does_not_depend_on_the_order_of_arrival(content, order):
     signals, states = recording(np.random.default_rng(content))
     random = np.random.default_rng(order)
     expected = as_data(run(signals, states))
-    cutter = WindowCutter(PARAMS, tuple(signals))
+    cutter, events = WindowCutter(PARAMS, tuple(signals)), []
     queues = {'': list(states), **{topic: list(batches) for topic, batches in signals.items()}}
-    events = []
     while any(queues.values()):
         topic = str(random.choice([name for name, queue in queues.items() if queue]))
-        for _ in range(int(random.choice([1, 3, 40]))):
-            if not queues[topic]:
-                break
+        for _ in range(min(int(random.choice([1, 3, 40])), len(queues[topic]))):
             item = queues[topic].pop(0)
-            if topic:
-                cutter.add_signal(topic, item)
-            else:
-                cutter.add_state(item)
-            if random.random() < 0.5:
-                events += cutter.take()
+            add = partial(cutter.add_signal, topic) if topic else cutter.add_state
+            add(item)
+            events += cutter.take() if random.random() < 0.5 else []
     assert as_data(events + cutter.finish()) == expected
 
 
@@ -271,55 +266,29 @@ def test_a_finger_that_drops_out_next_to_another_is_named_and_two_silent_ones_ar
     assert cutter.dropped(103.0) == ()  # nothing comes at all: the sensor itself reports that
 
 
-RATE_HZ = 100.0
-AXES_PARAMS = WindowParams(length_s=1.0, hop_s=0.5)
-BOTH = ('signal@x', 'signal@y')
-Y = 0.5 * math.pi
+BOTH, Y = ('signal@x', 'signal@y'), 0.5 * math.pi
 
 
-def signal(seconds):
-    """Return a signal whose samples are their time, s."""
-    samples = np.arange(round(seconds * RATE_HZ), dtype=np.float32)[:, None] / RATE_HZ
-    return TactileSignal(0, 's', ('pac',), (), RATE_HZ, 0, samples)
-
-
-def leg(start_s, seconds, direction_rad, speed_m_s=0.02):
+def leg(start_s, seconds, direction_rad):
     """Return the states of steady sliding in one direction, and that nothing is guaranteed after it."""
-    end_s = start_s + seconds
-    times = np.arange(start_s, end_s - 1e-9, 0.1)
-    steady = [(at, min(0.1, end_s - at), direction_rad) for at in times]
-    return [
-        ExplorationState(
-            round(at * NANOSECONDS),
-            'a',
-            'cross_slide',
-            Phase.SLIDE,
-            steady_s,
-            speed_m_s,
-            1.0,
-            direction,
-            surface='linen',
-        )
-        for at, steady_s, direction in [*steady, (end_s, 0.0, direction_rad)]
-    ]
+    more = {'direction_rad': direction_rad, 'surface': 'linen'}
+    return [state(start_s, steady_s=seconds, **more), state(start_s + seconds, **more)]
 
 
-def cut(*legs, inputs=BOTH, seconds=20.0):
+def cut(*legs, inputs=BOTH):
     states = [state for each in legs for state in each]
-    end = ExplorationState(states[-1].stamp_ns + NANOSECONDS // 10, 'a', 'cross_slide', Phase.LIFT)
-    return list(cut_recording({'signal': [signal(seconds)]}, [*states, end], AXES_PARAMS, inputs))
+    end = state((states[-1].stamp_ns - START_NS) / NANOSECONDS + 0.1, Phase.LIFT)
+    return list(cut_recording({'signal': stream(20.0, 100.0, 2000)}, [*states, end], WindowParams(1.0, 0.5), inputs))
 
 
 @pytest.mark.parametrize(('first', 'second'), [(0.0, Y), (Y, 0.0), (math.pi, -Y)])
 def test_windows_along_x_and_y_are_joined_whichever_comes_first(first, second):
     *windows, end = cut(leg(0.0, 2.0, first), leg(3.0, 2.0, second))
     assert isinstance(end, SlideEnd)
-    assert len(windows) == 3
-    starts = {name: [event.windows[name].samples[0, 0] for event in windows] for name in BOTH}
     first_name, second_name = BOTH if axis_along(first) == 'x' else BOTH[::-1]
-    assert starts[first_name] == pytest.approx([0.0, 0.5, 1.0])
-    assert starts[second_name] == pytest.approx([3.0, 3.5, 4.0])
-    assert [event.start_ns / NANOSECONDS for event in windows] == pytest.approx([3.0, 3.5, 4.0])
+    assert first_samples(windows, first_name) == [0, 50, 100]
+    assert first_samples(windows, second_name) == [300, 350, 400]
+    assert starts(windows) == [3.0, 3.5, 4.0]
     assert all(math.isnan(event.direction_rad) and event.surface == 'linen' for event in windows)
 
 
@@ -331,8 +300,7 @@ def test_without_both_axes_there_is_no_window(directions):
 
 def test_a_window_does_not_wait_for_the_next_exploration():
     joiner = AxisJoiner(BOTH)
-    [along_x] = cut(leg(0.0, 1.0, 0.0), inputs=('signal',))[:-1]
-    [along_y] = cut(leg(0.0, 1.0, Y), inputs=('signal',))[:-1]
+    along_x, along_y = (cut(leg(0.0, 1.0, direction), inputs=('signal',))[0] for direction in (0.0, Y))
     assert joiner.add(along_x) is None
     assert joiner.end() == 1
     assert joiner.add(along_y) is None
@@ -340,28 +308,21 @@ def test_a_window_does_not_wait_for_the_next_exploration():
 
 
 def test_a_window_along_one_axis_alone_needs_no_partner():
-    *windows, _ = cut(leg(0.0, 1.0, 0.0), leg(3.0, 1.0, Y), inputs=('signal@y',))
-    [window] = windows
-    assert window.windows['signal@y'].samples[0, 0] == pytest.approx(3.0)
+    [window, _] = cut(leg(0.0, 1.0, 0.0), leg(3.0, 1.0, Y), inputs=('signal@y',))
+    assert first_samples([window], 'signal@y') == [300]
     assert window.direction_rad == pytest.approx(Y)
 
 
 def test_the_features_of_both_axes_are_one_vector_live_and_offline_alike():
-    recipe = {
-        'windows': {'length_s': 1.0, 'hop_s': 0.5},
-        'inputs': {name: {'features': ['mean']} for name in BOTH},
-    }
-    feature_set = FeatureSet.from_mapping(recipe)
+    inputs = {name: {'features': ['mean']} for name in BOTH}
+    feature_set = FeatureSet.from_mapping({'windows': {'length_s': 1.0, 'hop_s': 0.5}, 'inputs': inputs})
     assert feature_set.topics == ('signal',)
     *windows, end = cut(leg(0.0, 2.0, 0.0), leg(3.0, 2.0, Y), inputs=feature_set.window_names)
-    single = [feature_set.extract(event) for event in windows]
-    many = feature_set.extract_many([*windows, end])
-    assert single[0].names == ('signal@x/mean/pac', 'signal@y/mean/pac')
-    assert np.array([vector.values for vector in single]) == pytest.approx(
-        np.array([[0.495, 3.495], [0.995, 3.995], [1.495, 4.495]])
-    )
-    assert [vector.values.tolist() for vector in many[:-1]] == [vector.values.tolist() for vector in single]
-    assert many[-1].last
+    single, (*many, last) = [feature_set.extract(event) for event in windows], feature_set.extract_many([*windows, end])
+    assert single[0].names == ('signal@x/mean/c0', 'signal@y/mean/c0')
+    assert [vector.values.tolist() for vector in single] == [[49.5, 349.5], [99.5, 399.5], [149.5, 449.5]]
+    assert [vector.values.tolist() for vector in many] == [vector.values.tolist() for vector in single]
+    assert last.last
 
 
 @pytest.mark.parametrize('name', ['signal@z', '@x', 'signal@'])
@@ -374,49 +335,3 @@ def test_inputs_with_and_without_an_axis_are_not_mixed():
     inputs = {'signal@x': {'features': ['mean']}, 'signal_static': {'features': ['mean']}}
     with pytest.raises(InvalidParameter, match='some of slides along an axis and some of any direction'):
         FeatureSet.from_mapping({'inputs': inputs})
-
-
-FRICTION_RATE_HZ, STEP_NS = 100.0, 20_000_000
-RECIPE = {'windows': {'length_s': 0.5, 'hop_s': 0.5}, 'inputs': {'signal': {'features': ['friction', 'mean']}}}
-
-
-def states(tangential_n, seconds=1.0):
-    """Slide under 2 N; each state holds the drag of the surface at its time."""
-    for number in range(round(seconds * 1e9 / STEP_NS)):
-        stamp_ns = number * STEP_NS
-        yield ExplorationState(
-            stamp_ns,
-            'a',
-            'linear_slide',
-            Phase.SLIDE,
-            0.02,
-            0.05,
-            2.0,
-            tangential_force_n=tangential_n(stamp_ns * 1e-9),
-        )
-
-
-def friction_of(tangential_n, stretch_to_m_s=0.0):
-    inputs = {'signal': {**RECIPE['inputs']['signal'], 'stretch_to_m_s': stretch_to_m_s}}
-    features = FeatureSet.from_mapping({**RECIPE, 'inputs': inputs})
-    batch = TactileSignal(0, 'finger', ('a',), (), FRICTION_RATE_HZ, 0, np.zeros((120, 1), dtype=np.float32))
-    events = list(cut_recording({'signal': [batch]}, states(tangential_n), WindowParams(0.5, 0.5)))
-    one_by_one = [features.extract(event) for event in events]
-    together = features.extract_many(events)
-    for single, several in zip(one_by_one, together, strict=True):
-        np.testing.assert_array_equal(single.values, several.values)
-    return [float(vector.values[0]) for vector in together if not vector.last]
-
-
-@pytest.mark.parametrize('coefficient', [0.1, 0.6, 1.2])
-@pytest.mark.parametrize('stretch_to_m_s', [0.0, 0.1])
-def test_the_feature_is_the_coefficient_of_coulomb_friction_at_any_stretch(coefficient, stretch_to_m_s):
-    assert friction_of(lambda _time_s: 2.0 * coefficient, stretch_to_m_s) == pytest.approx([coefficient] * 2)
-
-
-def test_each_window_has_the_mean_of_its_time():
-    assert friction_of(lambda time_s: 0.4 if time_s < 0.4999 else 1.0) == pytest.approx([0.2, 0.5])
-
-
-def test_an_arm_that_does_not_measure_it_gives_no_number():
-    assert np.isnan(friction_of(lambda _time_s: math.nan)).all()

@@ -221,7 +221,7 @@ class Correction:
         )
         factors[0] = 1.0
         samples = np.fft.irfft(np.fft.rfft(window.samples, axis=-2) * factors, count, axis=-2)
-        return replace(window, samples=samples, _memo={})
+        return replace(window, samples=samples)
 
     @classmethod
     def of(cls, found: Mapping[str, InputComparison]) -> Correction:

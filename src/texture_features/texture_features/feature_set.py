@@ -47,7 +47,6 @@ FEATURES: Mapping[str, type[Feature]] = {
     'mean_log_bands': spectral.MeanLogBands,
     'low_fft_bins': spectral.LowFftBins,
     'hjorth': temporal.Hjorth,  # Hjorth 1970; Kaboli et al. 2015
-    'short_time_fourier': spectral.ShortTimeFourier,
     'moments': temporal.Moments,
     'power_autocorrelation': spectral.PowerAutocorrelation,
     'mean': temporal.ChannelMean,
@@ -59,11 +58,8 @@ FEATURES: Mapping[str, type[Feature]] = {
     'spatial_variation': taxels.SpatialVariation,  # Lieber & Bensmaia 2019
     'spatial_band_power': taxels.SpatialBandPower,
     'peak_to_median_power': spectral.PeakToMedianPower,
-    'spatial_bands': taxels.SpatialBands,
     'mean_spatial_bands': taxels.MeanSpatialBands,
     'mean_statistics': taxels.ChannelMeanStatistics,
-    'log_shares': taxels.LogShares,  # Aitchison 1986, with signs
-    'relative_changes': taxels.RelativeChanges,
     'difference_correlation': taxels.DifferenceCorrelation,
     'load_level': taxels.LoadLevel,
     'speed': temporal.Speed,
@@ -162,7 +158,8 @@ class InputFeatures:
         options: dict[str, Any] = {'stretch_to_m_s': stretches[0]} if stretches else {}
         if self.tare:
             options['tare'] = self.tare
-        return {**options, 'features': [{name: _parameters(feature)} for name, feature in self.features]}
+        plain = [(name, one.feature if isinstance(one, Stretched) else one) for name, one in self.features]
+        return {**options, 'features': [{name: dataclasses.asdict(one)} for name, one in plain]}  # type: ignore[call-overload]
 
 
 @dataclass(frozen=True)
@@ -196,7 +193,9 @@ class FeatureSet:
     windows: WindowParams
     inputs: tuple[InputFeatures, ...]
     correction: Correction | None = None  # of another finger than that of the training
-    _layouts: dict[InputLayout, tuple[tuple[str, ...], str]] = field(default_factory=dict, repr=False, compare=False)
+    _layouts: dict[InputLayout, tuple[tuple[str, ...], str]] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     @classmethod
     def load(cls, name_or_path: str) -> FeatureSet:
@@ -211,7 +210,7 @@ class FeatureSet:
         feature_set = cls.from_mapping(recipe, f"recipe '{name_or_path}'")
         if not name_or_path.endswith(('.json', '.npz')):
             return feature_set
-        return dataclasses.replace(feature_set, correction=read_correction(name_or_path), _layouts={})
+        return dataclasses.replace(feature_set, correction=read_correction(name_or_path))
 
     @classmethod
     def from_mapping(cls, recipe: Mapping[str, Any], where: str = 'recipe') -> FeatureSet:
@@ -348,12 +347,12 @@ class FeatureSet:
         by_name = dict(zip(self.window_names, inputs, strict=True))
         if self.correction is not None:
             by_name = {name: self.correction.apply(topic_of(name), window) for name, window in by_name.items()}
-        blocks = [
-            feature(windows).reshape(flat)
-            for item in self.inputs
-            for windows in [_joined([by_name[name] for name in item.window_names])]
-            for _, feature in item.features
-        ]
+        blocks = []
+        for item in self.inputs:
+            windows, *others = (by_name[name] for name in item.window_names)
+            if others:
+                windows = dataclasses.replace(windows, joined=tuple(others))
+            blocks += [feature(windows).reshape(flat) for _, feature in item.features]
         return np.concatenate(blocks, axis=-1)
 
     def _vector(self, event: CutWindow, layout: InputLayout, values: Array) -> FeatureVector:
@@ -414,19 +413,12 @@ def _input(topic: str, section: Any, where: str) -> InputFeatures:
     options = from_mapping(InputOptions, {key: value for key, value in section.items() if key != 'features'}, place)
     if options.stretch_to_m_s and len(topics) > 1:
         raise InvalidParameter(f'{place}: joined inputs cannot be stretched; leave stretch_to_m_s out')
-    features = tuple((name, _prepared(feature, options)) for name, feature in chosen)
-    return InputFeatures(topic, features, options.tare)
-
-
-def _prepared(feature: Feature, options: InputOptions) -> Feature:
-    """Return the feature of the input as the options change it; features of the motion itself stay as they are."""
-    if not options.stretch_to_m_s or isinstance(feature, MOTION_FEATURES):
-        return feature
-    return Stretched(feature, options.stretch_to_m_s)
-
-
-def _joined(windows: Sequence[WindowBatch]) -> WindowBatch:
-    return windows[0] if len(windows) == 1 else dataclasses.replace(windows[0], joined=tuple(windows[1:]))
+    if options.stretch_to_m_s:  # features of the motion itself stay as they are
+        chosen = [
+            (name, one if isinstance(one, MOTION_FEATURES) else Stretched(one, options.stretch_to_m_s))
+            for name, one in chosen
+        ]
+    return InputFeatures(topic, tuple(chosen), options.tare)
 
 
 def _names(item: InputFeatures, channels: tuple[str, ...]) -> Iterable[str]:
@@ -441,12 +433,6 @@ def _names(item: InputFeatures, channels: tuple[str, ...]) -> Iterable[str]:
 
 def _layout(inputs: Sequence[Window]) -> InputLayout:
     return tuple((item.rate_hz, item.channels) for item in inputs)
-
-
-def _parameters(feature: Feature) -> dict[str, Any]:
-    if isinstance(feature, Stretched):
-        feature = feature.feature
-    return dataclasses.asdict(feature)  # type: ignore[call-overload]
 
 
 # --------------------
@@ -695,6 +681,9 @@ class LabelledFeatures:
             raise ModelMismatch(
                 f'the windows are described in different ways: {"; ".join(fingerprints)}; use those of one kind'
             )
+        running: defaultdict[str, RunningConditions] = defaultdict(RunningConditions)
+        for vector in used:
+            running[vector.exploration_id].update(vector)
         return cls(
             values=np.stack([vector.values for vector in used]),
             labels=np.array([surfaces[vector.exploration_id] for vector in used]),
@@ -704,12 +693,5 @@ class LabelledFeatures:
             window_s=used[0].window_s,
             hop_s=used[0].hop_s,
             start_ns=np.array([vector.start_ns for vector in used], dtype=np.int64),
-            conditions=_conditions(used),
+            conditions={exploration_id: conditions.get() for exploration_id, conditions in running.items()},
         )
-
-
-def _conditions(vectors: Iterable[FeatureVector]) -> Mapping[str, SlideConditions]:
-    running: defaultdict[str, RunningConditions] = defaultdict(RunningConditions)
-    for vector in vectors:
-        running[vector.exploration_id].update(vector)
-    return {exploration_id: conditions.get() for exploration_id, conditions in running.items()}

@@ -63,7 +63,7 @@ class WindowBatch:
     joined: tuple[WindowBatch, ...] = ()
     channels: tuple[str, ...] = ()
     tangential_force_n: Array = field(default_factory=lambda: np.array(np.nan))
-    _memo: dict[Hashable, Any] = field(default_factory=dict, repr=False)
+    _memo: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False)  # none of what it replaces
 
     def __post_init__(self) -> None:
         if self.samples.ndim < 2 or 0 in self.samples.shape[-2:]:
@@ -163,9 +163,13 @@ def centred(rows: Array) -> Array:
 @lru_cache(maxsize=64)
 def mean_weights(count: int) -> Array:
     """Return 1 / count, `count` times: what a mean is a product with."""
-    equal = np.full(count, 1.0 / count)
-    equal.flags.writeable = False
-    return equal
+    return shared_constant(np.full(count, 1.0 / count))
+
+
+def shared_constant(array: Array) -> Array:
+    """Return an array that is computed once and shared, and therefore may not be changed."""
+    array.flags.writeable = False
+    return array
 
 
 def power(rows: Array) -> Array:
@@ -306,8 +310,20 @@ class SampleBuffer:
     def append(self, signal: TactileSignal) -> int:
         """Append a batch; return how many samples were lost before it."""
         lost = signal.first_sample - self.next_sample
-        self._forget(signal.first_sample - self._keep)
-        self._make_room(signal.next_sample)
+        # Forget old samples; those already lost by then are not stored at all.
+        before = signal.first_sample - self._keep
+        if before > self.first_sample:
+            self.first_sample = before
+            self.next_sample = max(self.next_sample, before)
+            while self._marks and self._marks[0][0] < before:
+                self._marks.popleft()
+        # Make room for the new ones.
+        if signal.next_sample - self._origin > len(self._rows):
+            kept = self._rows[self.first_sample - self._origin : self.next_sample - self._origin]
+            needed = 2 * (signal.next_sample - self.first_sample)
+            rows = self._rows if needed <= len(self._rows) else np.empty((needed, len(self.channels)), dtype=np.float32)
+            rows[: len(kept)] = kept  # numpy copies overlapping memory correctly
+            self._rows, self._origin = rows, self.first_sample
         row = signal.first_sample - self._origin
         self._rows[self.next_sample - self._origin : row] = np.nan
         self._rows[row : row + len(signal.samples)] = signal.samples
@@ -336,24 +352,6 @@ class SampleBuffer:
         """Return a copy of samples that are kept, (count, n_channels) float64."""
         row = first_sample - self._origin
         return self._rows[row : row + count].astype(np.float64)
-
-    def _forget(self, before: int) -> None:
-        """Forget samples with an index below `before`; those already lost by then are not stored at all."""
-        if before <= self.first_sample:
-            return
-        self.first_sample = before
-        self.next_sample = max(self.next_sample, before)
-        while self._marks and self._marks[0][0] < before:
-            self._marks.popleft()
-
-    def _make_room(self, until: int) -> None:
-        if until - self._origin <= len(self._rows):
-            return
-        kept = self._rows[self.first_sample - self._origin : self.next_sample - self._origin]
-        needed = 2 * (until - self.first_sample)
-        rows = self._rows if needed <= len(self._rows) else np.empty((needed, len(self.channels)), dtype=np.float32)
-        rows[: len(kept)] = kept  # numpy copies overlapping memory correctly
-        self._rows, self._origin = rows, self.first_sample
 
 
 class BufferedStream:
@@ -454,9 +452,18 @@ class SlideCoverage:
                 return False
             start = before if stamp - before <= LINK_NS and not self._withdrawn else stamp
         self._promising |= state.steady_s > 0
-        self._cover(start, stamp + _steady_ns(state.steady_s))
+        end = stamp + round(min(max(0.0, state.steady_s), MAX_STEADY_S) * NANOSECONDS)
+        if self._intervals and start <= self._intervals[-1][1]:
+            self._intervals[-1][1] = max(self._intervals[-1][1], end)
+        else:
+            self._intervals.append([start, end])
         self._withdrawn = self._promising and not state.steady_s > 0
-        if self._withdrawn and self._is_far(state):
+        far = (
+            state.force_n < LEAST_FORCE * self._force.value
+            or state.force_n > MOST_FORCE * self._force.value
+            or state.speed_m_s > MOST_SPEED * self._speed.value
+        )
+        if self._withdrawn and far:
             self._intervals[-1][1] = min(self._intervals[-1][1], stamp)
         if state.steady_s > 0:
             self._force.update(state.force_n)
@@ -487,20 +494,6 @@ class SlideCoverage:
         count = min(count, left)
         self._next_ns += count * self._hop_ns
         return count
-
-    def _is_far(self, state: ExplorationState) -> bool:
-        force_n, speed_m_s = self._force.value, self._speed.value
-        return (
-            state.force_n < LEAST_FORCE * force_n
-            or state.force_n > MOST_FORCE * force_n
-            or state.speed_m_s > MOST_SPEED * speed_m_s
-        )
-
-    def _cover(self, start: int, end: int) -> None:
-        if self._intervals and start <= self._intervals[-1][1]:
-            self._intervals[-1][1] = max(self._intervals[-1][1], end)
-        else:
-            self._intervals.append([start, end])
 
     def _span(self, start: int, end: int) -> CoveredSpan:
         states = self._states
@@ -549,14 +542,11 @@ class RunningMean:
             self.range = (low if low <= mean else mean, high if high >= mean else mean)  # NaN is neither
 
 
-def _steady_ns(steady_s: float) -> int:
-    return round(min(steady_s, MAX_STEADY_S) * NANOSECONDS) if steady_s > 0 else 0
-
-
 # --------------------
 # Cut windows from the sliding part of tactile streams, as soon as the last sample of each is there.
 
-TIMEOUT_S = 0.3
+# For how long a slide that is over waits for its last samples; the explorer's `estimate_timeout_s` must be longer.
+LATE_SAMPLES_S = 0.3
 DROPPED_S = 1.0  # an input that is silent for so long while others come is reported
 ALL = 1 << 62
 
@@ -687,7 +677,7 @@ class WindowCutter:
             if source.received or math.isnan(source.received_s):
                 source.received, source.received_s = False, now_s
         awaited = [source for source in self._inputs.values() if source.due < math.inf]
-        silent = any(now_s - source.received_s >= TIMEOUT_S for source in awaited)
+        silent = any(now_s - source.received_s >= LATE_SAMPLES_S for source in awaited)
         return events + (self._give_up() if silent else [])
 
     def finish(self) -> list[WindowEvent]:
@@ -737,7 +727,20 @@ class WindowCutter:
                 self._skip(slide, self._lost)
                 continue
             slide.advance()
-            event: CutWindow | None = self._window_event(slide, span, found)
+            event: CutWindow | None = CutWindow(
+                start_ns=span.start_ns,
+                exploration_id=slide.exploration_id,
+                length_s=self._params.length_s,
+                hop_s=self._params.hop_s,
+                windows=found,
+                speed_m_s=span.speed_m_s,
+                force_n=span.force_n,
+                surface=slide.surface,
+                skipped=slide.skipped,
+                motion=slide.motion,
+                direction_rad=span.direction_rad,
+                tangential_force_n=span.tangential_force_n,
+            )
             if self._joiner.joins and event is not None:
                 event = self._joiner.add(event)
             if event is not None:
@@ -769,7 +772,11 @@ class WindowCutter:
             count = max(1, round(self._params.length_s * buffer.rate_hz))
             if first >= buffer.first_sample and first + count <= buffer.next_sample:
                 source.due = math.inf
-                return _finite_window(buffer, first, count, span)
+                samples = buffer.take(first, count)
+                if not np.isfinite(samples).all():
+                    return _Missing.LOST
+                rate_hz, names, sensor = buffer.rate_hz, buffer.channels, buffer.sensor
+                return Window(samples, rate_hz, names, span.start_ns, span.speed_m_s, span.force_n, sensor)
             state = _Missing.LOST if first < buffer.first_sample else _Missing.LATE
             source.due = first + count
             if state is _Missing.LOST:
@@ -780,22 +787,6 @@ class WindowCutter:
             source.due = math.inf
             self._lost = max(1, lost)
         return state
-
-    def _window_event(self, slide: SlideCoverage, span: CoveredSpan, windows: Mapping[str, Window]) -> CutWindow:
-        return CutWindow(
-            start_ns=span.start_ns,
-            exploration_id=slide.exploration_id,
-            length_s=self._params.length_s,
-            hop_s=self._params.hop_s,
-            windows=windows,
-            speed_m_s=span.speed_m_s,
-            force_n=span.force_n,
-            surface=slide.surface,
-            skipped=slide.skipped,
-            motion=slide.motion,
-            direction_rad=span.direction_rad,
-            tangential_force_n=span.tangential_force_n,
-        )
 
     def _skip(self, slide: SlideCoverage, count: int) -> None:
         skipped = slide.advance(count)
@@ -852,13 +843,6 @@ def cut_recording(
         add(item)
         yield from cutter.take()
     yield from cutter.finish()
-
-
-def _finite_window(buffer: SampleBuffer, first: int, count: int, span: CoveredSpan) -> Window | _Missing:
-    samples = buffer.take(first, count)
-    if not np.isfinite(samples).all():
-        return _Missing.LOST
-    return Window(samples, buffer.rate_hz, buffer.channels, span.start_ns, span.speed_m_s, span.force_n, buffer.sensor)
 
 
 def _calls(add: Callable[[Any], None], items: Iterable[Any]) -> Iterator[tuple[int, Callable[[Any], None], Any]]:

@@ -9,7 +9,7 @@ from scipy import stats
 
 from texture_core.types import Window
 from texture_features.feature_set import FEATURES, FeatureSet
-from texture_features.features.spectral import ShortTimeFourier, hann, long_densities
+from texture_features.features.spectral import hann, long_densities
 from texture_features.windows import CutWindow, WindowBatch
 from texture_papers.hu import Spectrum
 from texture_papers.jamali import MeanAmplitude, RegionPeaks, region_peaks
@@ -96,14 +96,6 @@ def test_long_windows_are_averaged_over_half_overlapping_segments():
     rows = noise(2, 1000)
     _, expected = scipy_signal.welch(rows, RATE_HZ, window=hann(256), nperseg=256)
     np.testing.assert_allclose(long_densities(rows, RATE_HZ, 128), expected[:, 1:], rtol=1e-8)
-
-
-def test_the_part_in_which_a_tone_sounds_has_the_power():
-    feature = ShortTimeFourier(parts=4, bands=16)
-    late = tone(203.0) * (np.arange(1000) >= 760)[:, None]
-    values = feature(windows(late))[0]
-    assert feature.names[int(values.argmax())] == '4/6'  # band k reaches around k · 500 Hz / 16
-    assert values.reshape(4, 16)[3, 5] - values.reshape(4, 16)[0].max() > 10.0
 
 
 def joined(fast, slow, fast_hz=2200.0, slow_hz=100.0):

@@ -602,7 +602,7 @@ def recipe_of(method: Method) -> Recipe:
     learner: Any = recipe.learner
     return replace(
         recipe,
-        feature_set=replace(recipe.feature_set, inputs=inputs, _layouts={}),
+        feature_set=replace(recipe.feature_set, inputs=inputs),
         learner=replace(learner, **method.learner),
     )
 
@@ -622,7 +622,7 @@ def evaluate_method(
     more: Array | None = None,
 ) -> MethodResult:
     """Learn from the slides of each split and evaluate all; `more` are features of each slide, (n_slides, n)."""
-    to_learn = replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
+    to_learn = replace(recipe.feature_set, windows=recipe.training_windows)
     trained, owner = slides.extract(to_learn, views)
     tested_values, slide = slides.extract(recipe.feature_set, views)
     if more is not None:

@@ -397,7 +397,7 @@ def checkless(recipe: RoughnessRecipe) -> RoughnessRecipe:
         for item in recipe.feature_set.inputs
     )
     kept = tuple(item for item in inputs if item.features)
-    return replace(recipe, feature_set=replace(recipe.feature_set, inputs=kept, _layouts={}))
+    return replace(recipe, feature_set=replace(recipe.feature_set, inputs=kept))
 
 
 def _leave_one_out(simulated: SimulatedTextures, recipe: RoughnessRecipe) -> Answers:

@@ -77,7 +77,7 @@ class SlideArrays:
 
     def values(self, recipe: Any) -> Array:
         """Return the features with which a recipe is trained, (n_windows, n_features)."""
-        return self.features(replace(recipe.feature_set, windows=recipe.training_windows, _layouts={}))
+        return self.features(replace(recipe.feature_set, windows=recipe.training_windows))
 
     def features(self, feature_set: FeatureSet) -> Array:
         """Return the features of all windows, scan by scan, as many of each, (n_windows, n_features)."""

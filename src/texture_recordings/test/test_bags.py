@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 import dataclasses
 import math
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -243,19 +242,6 @@ def test_a_bag_that_was_cut_or_has_a_flipped_bit_is_refused_or_read_as_it_was_wr
         except InvalidData:
             refused += 1
     assert refused > len(damaged) // 2
-
-
-def test_a_bag_of_a_named_pipe_or_a_device_is_refused_at_once(tmp_path: Path) -> None:
-    for name in ('bag.mcap', 'metadata.yaml'):
-        bag = write(tmp_path / name / 'bag')
-        (bag / name).unlink()
-        os.mkfifo(bag / name)
-        with pytest.raises(InvalidData, match=r'named pipe|no metadata'):
-            list(read_bag(bag))
-        (bag / name).unlink()
-        (bag / name).symlink_to('/dev/zero')
-        with pytest.raises(InvalidData, match=r'device|no metadata'):
-            list(read_bag(bag))
 
 
 @pytest.mark.parametrize('storage', [StoragePlugin.MCAP, StoragePlugin.SQLITE3])

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import scipy.io
 from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import get_types_from_msg
 
 from texture_core.errors import InvalidData
 from texture_recordings.bags import message_types
@@ -46,8 +47,10 @@ def check(folder: Path, write: Write, content: dict, truth: Truth, kind: str = '
     assert sorted(dataset.labels) == [label for label, _ in truth]
     for slide, (_, samples) in zip(sorted(dataset, key=lambda slide: slide.surface), truth, strict=True):
         batches = slide.signals['signal']
-        read = np.concatenate([batch.samples for batch in batches])
-        assert batches[-1].next_sample - batches[0].first_sample == len(read)
+        first, stop = batches[0].first_sample, batches[-1].next_sample
+        read = np.full((stop - first, len(batches[0].channels)), np.nan)  # also of samples that were lost
+        for batch in batches:
+            read[batch.first_sample - first : batch.next_sample - first] = batch.samples
         np.testing.assert_allclose(read, np.reshape(samples, (len(read), -1)), atol=2e-4)
 
 
@@ -68,11 +71,65 @@ def both(*writes: Write) -> Write:
     return lambda folder: [write(folder) for write in writes]
 
 
+def bursts(size: int, step_s: float = 50e-6) -> np.ndarray:
+    """Return times of rows that are stamped `size` at a time."""
+    return (T[(np.arange(N) // size) * size] + step_s * (np.arange(N) % size)).round(6)
+
+
+def timed(unit: str = 's', rate_hz: float = 0.0, **content: Any) -> dict:
+    stream = {'columns': ['x'], 'time': {'column': 't', 'unit': unit}, 'rate_hz': rate_hz}
+    return {'streams': {'signal': stream}, **content}
+
+
 ANY = {'files': '{material}_{run}.*'}
 CORK: Truth = [('cork', X)]
+LOST = np.isin(np.arange(N), [100, 101, 260, 433])
+HOLED = np.where(LOST, np.nan, X)
+UNEVEN = np.floor(T * 41.7) / 41.7  # of a buffer that is read 41.7 times a second, with two or three rows
+PAUSE = {'slides': {'by': 'pause', 'min_s': 0.05}}
+BACK = r"row \d+, column 't': time goes back .*by: pause"
 CLOCKS: dict[str, tuple[Write, dict, Truth]] = {
+    'bursts that lost rows': (
+        csv(bursts(3)[~LOST], X[~LOST]), {},
+        'in bursts of 1 to 3, so lost rows cannot be told; .* the rate is 99',
+    ),
+    'bursts of a buffer that is read at any time': (csv(UNEVEN, X), {}, 'in bursts of 2 to 3, so lost rows cannot'),
+    'bursts in disorder': (
+        csv(bursts(3)[np.r_[0:100, 101, 100, 102:N]], X), {}, '2 of 600 rows, which come in bursts, are out of order',
+    ),
+    'ms at 1000 Hz': (
+        csv((T[~LOST] / 10).round(3), X[~LOST]), {}, 'counts in steps of 0.001 s at 1000 Hz, so lost samples cannot be',
+    ),
+    'ms at 1000 Hz that are stated': (
+        csv((T[~LOST] / 10).round(3), X[~LOST]), timed(rate_hz=1000.0), [('cork', HOLED)],
+    ),
+    'a gap': (
+        csv(np.where(T < 3, T, T + 0.07).round(2), X), timed(rate_hz=100.0),
+        [('cork', np.insert(X, 300, [np.nan] * 7))],
+    ),
+    'a counter of 16 bits in ms': (csv((6e4 * T).astype(int) % 2**16, X), timed('ms'), 'rate of .* is 1.667 Hz'),
+    'a counter of 16 bits in us': (csv((1e6 * T).astype(int) % 2**16, X), timed('us'), CORK),
+    'a counter of 32 bits in us': (csv(((1e6 * T).astype(int) + 2**32 - 10**6) % 2**32, X), timed('us'), CORK),
+    'a counter of 31 bits in ms': (csv(((1e3 * T).astype(int) + 2**31 - 5000) % 2**31, X), timed('ms'), CORK),
+    'a counter of 32 bits in ns': (csv(((1e9 * T).astype(int) + 2**32 - 10**8) % 2**32, X), timed('ns'), CORK),
+    'a counter of 24 bits in us': (csv((T * 1e6 + 3e6) % 2**24, X), timed('us'), CORK),
+    'runs': (csv(np.r_[T[:100], T[:500]], X), {}, BACK),
+    'a run of few rows': (csv(np.r_[T[:590], T[:10]], X), {}, BACK),
+    'runs by pause': (csv(np.r_[T[:100], T[:500]], X), PAUSE, [('cork', X[:100]), ('cork', X[100:])]),
+    'a run of few rows by pause': (csv(np.r_[T[:590], T[:10]], X), PAUSE, [('cork', X[:590]), ('cork', X[590:])]),
+    'a pause': (csv(np.r_[T[:100], 3 + T[:500]], X), PAUSE, [('cork', X[:100]), ('cork', X[100:])]),
+    'ms that are called s': (csv(1e3 * T, X), {}, r'0\.1 Hz by its times; with unit: ms it were 100 Hz'),
+    'us that are called ms': (csv(1e6 * T, X), timed('ms'), 'rate of .* with unit: us'),
+    'a speed in cm/s': (csv(T, X), {'conditions': {'speed': {'value': '20'}}}, 'speed .* 20 m/s.* may be cm/s or mm/s'),
+    'a speed in m/s': (
+        csv(T, X), {'conditions': {'speed': {'value': '0.03', 'unit': 'mm/s'}}}, r'0\.03 mm/s.* may be m/s or cm/s',
+    ),
+    'a force in gf': (csv(T, X), {'conditions': {'force': {'value': '150'}}}, 'force .* 150 N.* may be mN or gf'),
+    'degrees': (csv(T, X), {'conditions': {'direction': {'value': '90'}}}, 'direction of .* 90 rad.* may be deg'),
+    'a slide of hours': (csv(X, names='x'), {'streams': {'signal': {'columns': ['x'], 'rate_hz': 0.05}}}, 'lasts 1.2e'),
     'rate changes': (
-        csv(np.r_[T[:300], 3 + np.arange(300) / 125], X), {}, 'rate changes within a slide: 100 Hz from here',
+        csv(np.r_[T[:300], 3 + np.arange(300) / 125], X), {},
+        'the rate changes within a slide: by 111.1 Hz this row is 17.5 samples off',
     ),
     'rate drifts': (csv(np.cumsum(np.linspace(0.008, 0.012, N)).round(6), X), {}, 'rate changes within a slide'),
     'midnight': (csv(((T + 86_397) % 86_400).round(2), X), {}, CORK),
@@ -81,8 +138,8 @@ CLOCKS: dict[str, tuple[Write, dict, Truth]] = {
     'newest first': (csv(T[::-1], X[::-1]), {}, 'the times of .signal. do not grow'),
     'logs overlap by few rows': (csv(np.r_[T[:300], T[297:]], np.r_[X[:300], X[297:]]), {}, CORK),
     'logs overlap': (
-        csv(np.r_[T[:300], T[280:]], np.r_[X[:300], X[280:]]), {'slides': {'by': 'pause'}},
-        'row 302, .*the rows from here on are those from row 282 on',
+        csv(np.r_[T[:300], T[200:]], np.r_[X[:300], X[200:]]), {'slides': {'by': 'pause'}},
+        'row 302, .*the rows from here on are those from row 202 on',
     ),
 }  # fmt: skip
 
@@ -90,6 +147,14 @@ CLOCKS: dict[str, tuple[Write, dict, Truth]] = {
 @pytest.mark.parametrize('name', CLOCKS)
 def test_clocks(tmp_path: Path, name: str) -> None:
     check(tmp_path, *CLOCKS[name])
+
+
+@pytest.mark.parametrize('size', [2, 3, 5, 10, 20, 30])
+@pytest.mark.parametrize('step_s', [0.0, 50e-6])
+def test_rows_of_a_buffer_have_the_rate_of_rows_and_duration(tmp_path: Path, size: int, step_s: float) -> None:
+    check(tmp_path, csv(bursts(size, step_s), X), {}, CORK)
+    [slide] = SlideDataset.from_bags([tmp_path / 'bags'])
+    assert slide.signals['signal'][0].sampling_rate_hz == pytest.approx(100.0, rel=0.01)
 
 
 HALVES: Truth = [('cork', X[:300]), ('felt', X[300:])]
@@ -101,9 +166,8 @@ def coded(codes: Any) -> Write:
     return csv(T, X, codes, names='t,x,l')
 
 
-def grouped(first: int) -> Write:
-    parts = {f'data/{first + number}/x': samples for number, samples in enumerate((X, Y))}
-    return npz(**parts, material=np.array(['cork', 'felt']))
+def grouped(folder: Path) -> None:
+    npz(**{'data/1/x': X, 'data/2/x': Y}, material=np.array(['cork', 'felt']))(folder)
 
 
 LABELS: dict[str, tuple[Write, dict, Truth]] = {
@@ -117,12 +181,28 @@ LABELS: dict[str, tuple[Write, dict, Truth]] = {
         coded(['1_0'] * 300 + ['10'] * 300),
         {**CODES, 'label': {'column': 'l', 'names': {10: 'felt'}}}, [('1_0', X[:300]), ('felt', X[300:])],
     ),
+    'a label that changes within a slide': (
+        csv(T, X, ['cork'] * 300 + ['felt'] * 300, names='t,x,l'), {'label': {'column': 'l'}},
+        r"row 302, column 'l': the label changes from 'cork' to 'felt' within a slide",
+    ),
+    'patterns of values': (
+        csv(T, X, np.repeat(['idle', 'pass_1', 'back', 'pass_2', '[x]'], N // 5), names='t,x,l'),
+        {'slides': {'by': 'column', 'column': 'l', 'values': ['pass_*', '[x]']}},
+        [('cork', X[120:240]), ('cork', X[360:480]), ('cork', X[480:])],
+    ),
     'nan outside slides': (coded(['nan'] * 100 + ['0'] * 500), CODES, [('cork', X[100:])]),
     'floats with NaN': (
         npz(t=T, x=X, l=np.r_[np.full(100, np.nan), np.zeros(200), np.ones(300)]), {**CODES, **ANY},
         [('cork', X[100:300]), ('felt', X[300:])],
     ),
-    'elements from 0 on': (grouped(0), PARTS, [('cork', X), ('felt', Y)]),
+    **{
+        f'once in {every} rows': (
+            csv(T, X, ['' if row % every else 'cork' for row in range(N)], names='t,x,l'), {'label': {'column': 'l'}},
+            CORK,
+        )
+        for every in (1, 10, 300, N)
+    },
+    'a list of labels next to the elements': (grouped, PARTS, "no column 'material'"),
 }  # fmt: skip
 
 
@@ -141,13 +221,39 @@ def wide(columns: int, *order: int, names: str = 'pac_') -> Write:
     return csv(*samples.T[numbers], names=','.join(f'{names}{number}' for number in numbers))
 
 
-HOLED = X.copy()
-HOLED[[100, 200]] = np.nan
+MISSING = X.copy()
+MISSING[[100, 200]] = np.nan
 PAC = {'columns': ['pac_*'], 'rate_hz': 1200.0}
 THOUSANDS = [f'{value:,}' for value in np.round(2000 * X).astype(int).tolist()]
 GERMAN = {'format': {'delimiter': ';', 'decimal': ','}, **RATE}
-TWICE = {'signal': {'columns': ['x'], 'rate_hz': 100.0}, 'signal_static': {'columns': ['y'], 'rate_hz': 100.0}}
+TWICE = {'signal': {'columns': ['x'], 'rate_hz': 100.0}, 'signal_static': {'columns': ['y'], 'rate_hz': 10.0}}
+WINDOWS = np.random.default_rng(0).normal(size=(30, 40)).round(3)
+WINDOW = {'columns': ['x_*'], 'rate_hz': 100.0}
+
+
+def windows(folder: Path) -> None:
+    csv(*WINDOWS.T, names=','.join(f'x_{number}' for number in range(40)))(folder)
+
+
+def alternating(*names: Any) -> Write:
+    count = len(names)
+    samples = np.repeat(X, count) * np.tile(1 + np.arange(count), N)
+    return csv(np.repeat(T, count), samples, list(names) * N, names='t,x,sensor')
+
+
 ROWS: dict[str, tuple[Write, dict, Truth]] = {
+    **{
+        f'sensors {names}': (
+            alternating(*names), {}, r"one value of 'sensor' after the other .*rows: \{sensor: ",
+        )
+        for names in (('S2', 'S1'), ('a', 'b', 'c'), (0, 1, 2, 3))
+    },
+    'one of three sensors': (alternating('a', 'b', 'c'), {'rows': {'sensor': 'a'}}, CORK),
+    'windows': (windows, {'streams': {'signal': WINDOW}}, '40 columns, x_0 … x_39, and 30 rows; write samples_per_row'),
+    'windows that are slides': (
+        windows, {'streams': {'signal': {**WINDOW, 'samples_per_row': 40}}, 'slides': {'by': 'row'}},
+        [('cork', window) for window in WINDOWS],
+    ),
     'sensors at times of their own': (
         csv(np.ravel(np.c_[T, T + 0.005]).round(4), np.ravel(np.c_[X, Y]), ['a', 'b'] * N, names='t,x,id'), {},
         r"one value of 'id' after the other \(a, b\).*rows: \{id: 'a'\}",
@@ -157,33 +263,43 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
         csv(np.ravel(np.c_[X, Y]), [1, 2] * N, names='x,id'), {**RATE, 'rows': {'id': '*'}},
         [('cork', np.ravel(np.c_[X, Y]))],
     ),
-    'a row goes on in the next': (wide(22), {'streams': {'signal': PAC}}, 'pac_0 … pac_21 go on from row to row'),
+    'a row goes on in the next': (
+        wide(22), {'streams': {'signal': PAC}}, 'pac_0 … pac_21, and 600 rows; write samples_per_row: 22',
+    ),
     'columns in the order of texts': (
         wide(12, 0, 1, 10, 11, *range(2, 10)), {'streams': {'signal': {**PAC, 'samples_per_row': 12}}},
         'pac_0, pac_1, pac_10, pac_11 …, whose numbers do not count up',
     ),
     'two rates of the same rows': (
+        csv(X, Y, names='x,y'), {'streams': TWICE}, "rows per second are 100 by 'signal', 10 by 'signal_static'",
+    ),
+    'blanks without times': (
         csv(X, [y if row % 10 == 0 else '' for row, y in enumerate(Y)], names='x,y'), {'streams': TWICE},
-        "rows per second are 100 by 'signal', 10 by 'signal_static'",
+        "540 malformed rows of 600, first row 3",
     ),
     'a header again without times': (
         text('x,y\n' + lines(X[:300], Y[:300]) + 'x,y\n' + lines(X[300:], Y[300:])), RATE, 'row 302: the names of the',
     ),
     'a header in another order': (
         text('t,x,y\n' + lines(T[:300], X[:300], Y[:300]) + 't,y,x\n' + lines(T[300:], Y[300:], X[300:])), {},
-        'row 302: names of columns come again, and are t, y, x',
+        'row 302: the names of the columns come again, t, y, x',
     ),
     'units below the header': (text('n,x\nsample,1\n' + lines(range(N), X)), RATE, CORK),
     'a mean below the rows': (text('n,x\n' + lines(range(N), X) + 'Mean,0.3\n'), RATE, CORK),
     'a last row that was cut': (text(('t,x\n' + lines(T, [f'{x:.6f}' for x in X]))[:-4]), {}, [('cork', X[:-1])]),
     '#N/A in the first column': (
-        csv(['#N/A' if np.isnan(x) else x for x in HOLED], Y, names='x,y'), RATE, [('cork', HOLED)],
+        csv(['#N/A' if np.isnan(x) else x for x in MISSING], Y, names='x,y'), RATE, [('cork', MISSING)],
     ),
-    'an underscore': (csv([*X[:100], '1_000', *X[101:200], '-', *X[201:]], names='x'), RATE, [('cork', HOLED)]),
+    'an underscore': (csv([*X[:100], '1_000', *X[101:200], '-', *X[201:]], names='x'), RATE, [('cork', MISSING)]),
     'no header': (text(lines(X, Y)), {'streams': {'signal': {'columns': ['*'], 'rate_hz': 100.0}}}, 'no names; write'),
     'commas decimal and delimiters': (
         text('n,x,y\n' + lines(range(N), [f'{x:.4f}'.replace('.', ',') for x in X])), RATE, "'y' holds digits such as",
     ),
+    'a header in the coding of Windows': (
+        lambda folder: (folder / 'cork_1.csv').write_bytes(('n,x [m/s²]\n' + lines(range(N), X)).encode('cp1252')),
+        {'streams': {'signal': {'columns': ['x [m/s²]'], 'rate_hz': 100.0}}}, CORK,
+    ),
+    'decimal commas': (text('n;x\n' + '1;0,5\n' * 200), RATE, "'0,5' is not a finite number; if commas are decimal"),
     'points of thousands': (
         text('n;x\n' + ''.join(f'{n};{x.replace(",", ".")}\n' for n, x in enumerate(THOUSANDS))), GERMAN,
         r"'1\.\d+' is not a finite number",
@@ -228,14 +344,14 @@ CONTAINERS: dict[str, tuple[Write, dict, Truth]] = {
     'records of arrays': (
         records, {**ANY, 'streams': {'signal': {'columns': ['d.acc.*'], 'rate_hz': 100.0}}}, [('cork', np.c_[X, Y])],
     ),
-    'parts that were never written': (h5(1000), {**ANY, **RATE}, '400 malformed rows of 1000, first row 600'),
+    'parts that were never written': (h5(1000), {**ANY, **RATE}, 'has parts that were never written'),
     'values with a scale': (h5(scale_factor=0.5, add_offset=3.0), {**ANY, **RATE}, [('cork', 0.5 * X + 3.0)]),
-    'a WAV file that was cut': (wav(2 * N + 2000), SOUND, 'declares 3200 bytes of sound and has 1200'),
-    'a WAV file of a pipe': (wav(2**32 - 1), SOUND, [('cork', X / 2)]),
+    'a WAV file that was cut': (wav(2 * N + 2000), SOUND, 'was cut off, .* declares 3200 bytes of sound and has 1200'),
+    'a WAV file of a pipe': (wav(2**32 - 1), SOUND, 'or written to a pipe: it declares 4294967295 bytes'),
     'two sounds': (wav(2 * N, 2), SOUND, 'has 2 chunks of sound'),
     'trials as one slide': (
         npz(X=np.ones((20, 100, 3))), {**ANY, 'streams': {'signal': {'columns': ['X.*'], 'rate_hz': 100.0}}},
-        r'20 trials; write slides: \{by: column, column: trial\}',
+        r'has trials; write slides: \{by: column, column: trial\}',
     ),
     'a folder': (both(csv(T, X), lambda folder: (folder / 'felt_1.csv').mkdir()), {}, "'felt_1.csv' is a folder"),
 }  # fmt: skip
@@ -293,21 +409,20 @@ def emptied(folder: Path) -> None:
     (folder / 'a_1' / 'metadata.yaml').write_text('')
 
 
-def mp3(folder: Path) -> None:
-    kind, rng = 'audio_common_msgs/msg/AudioData', np.random.default_rng(0)
+def sound(folder: Path) -> None:
+    kind, store = 'audio_common_msgs/msg/AudioData', message_types()
+    store.register(get_types_from_msg('uint8[] data', kind))
     with Writer(folder / 'a_1', version=8, storage_plugin=StoragePlugin.MCAP) as writer:
-        connection = writer.add_connection('/p', kind, typestore=STORE)
-        for number in range(20):
-            data = np.r_[np.array([0xFF, 0xFB], np.uint8), rng.integers(0, 256, 416).astype(np.uint8)]
-            value = STORE.types[kind](data=data)
-            writer.write(connection, START_NS + number * STEP_NS, STORE.serialize_cdr(value, kind))
+        connection = writer.add_connection('/p', kind, typestore=store)
+        writer.write(connection, START_NS, store.serialize_cdr(store.types[kind](data=np.zeros(400, np.uint8)), kind))
 
 
 BAGS: dict[str, tuple[Write, Truth]] = {
+    'a bag of ROS 1': (text('#ROSBAG V2.0', 'a_1.bag'), 'is a bag of ROS 1; convert it: rosbags-convert'),
     'a clock one hour ahead': (bag(3600.0), HALVES),
     'a clock that began at the start': (bag(-1.7e9 + 100.0), HALVES),
     'sensors of two frames': (bag(frames=2), r"have the frames a, b.*rows: \{'/p/header.frame_id': 'a'\}"),
-    'packed sound': (mp3, 'it is MP3 and no plain sound'),
+    'sound': (sound, 'is sound whose messages do not tell the format; give a WAV file'),
     'a clock that is faster': (bag(3600.0, 0.5), r"topic '/p': the stamps differ .* and that changes by 2\.\d+ s"),
     'empty metadata': (both(bag(), emptied), HALVES),
     'several files without metadata': (
@@ -344,7 +459,7 @@ def arrays(folder: Path, first: str, second: str) -> None:
             writer.write(connection, START_NS + 10 * number * STEP_NS, STORE.serialize_cdr(value, kind))
 
 
-@pytest.mark.parametrize(('first', 'second'), [('samples', 'channels'), ('taxels', 'time'), ('', '')])
+@pytest.mark.parametrize(('first', 'second'), [('samples', 'channels'), ('channels', 'samples'), ('', '')])
 def test_arrays_of_two_dimensions_are_read_as_their_labels_name_them(tmp_path: Path, first: str, second: str) -> None:
     streams = {'signal': {'columns': ['/a/data.*']}}
     truth: Truth = [('cork', np.c_[X, Y])] if first else "named '' and '', which does not tell samples"
@@ -380,12 +495,28 @@ def h5_without_rows(folder: Path) -> None:
         file.create_dataset('x', (0, 10**9), 'f8', chunks=(1, 1000), maxshape=(None, 10**9))
 
 
+def h5_of_holes(folder: Path) -> None:
+    with h5py.File(folder / 'cork_1.h5', 'w') as file:
+        file.create_dataset('x', shape=(10**10,), chunks=(10**6,), compression='gzip')
+
+
 SIZES: dict[str, tuple[Write, str]] = {
-    'cells': (mat(matlab(1, 400_000_000)), 'declares an array of 400000000 cells'),
-    'cells in a cell': (mat(matlab(1, 1, matlab(1, 400_000_000, name=b''))), 'declares an array of 400000000 cells'),
-    'numbers': (mat(matlab(6, 2_000_000_000, element(9, bytes(80)))), "declares 2000 million values of 'x'"),
+    'cells': (mat(matlab(1, 400_000_000)), "'cork_1.mat' cannot be read"),
+    'cells in a cell': (mat(matlab(1, 1, matlab(1, 400_000_000, name=b''))), "'cork_1.mat' cannot be read"),
+    'numbers': (mat(matlab(6, 2_000_000_000, element(9, bytes(80)))), "'cork_1.mat' cannot be read"),
     'no rows': (h5_without_rows, 'declares more than 8 million values'),
     'a header': (csv(names=','.join(f'x{number}' for number in range(20_000))), 'has 20000 columns; at most 10000'),
+    'holes': (h5_of_holes, 'declares more than 8 million values'),
+    'zeros': (
+        lambda folder: np.savez_compressed(folder / 'cork_1.npz', x=np.zeros(9_000_000, np.uint8)),
+        'declares more than 8 million values',
+    ),
+    'packed zeros': (
+        lambda folder: scipy.io.savemat(
+            folder / 'cork_1.mat', {'x': np.zeros(70_000_000, np.uint8)}, do_compression=True
+        ),
+        'declares more than 8 million values',
+    ),
     'sound': (wav(2**32 - 100), 'declares 4294967196 bytes of sound and has 1200'),
 }  # fmt: skip
 
@@ -398,3 +529,120 @@ def test_sizes(tmp_path: Path, name: str) -> None:
 
 def test_a_matlab_file_of_ordinary_size_is_read(tmp_path: Path) -> None:
     check(tmp_path, lambda folder: scipy.io.savemat(folder / 'cork_1.mat', {'x': X}), {**ANY, **RATE}, CORK)
+
+
+def run(folder: Path, kinds: tuple[str, ...] = MAPPED['table'], **content: Any) -> Any:
+    """Import what lies in a folder, by time in column t unless given otherwise."""
+    source = content.pop('source', folder)
+    mapping = mapping_from({'files': '{material}_{run}.*', 'label': {'column': 'material'}, **content})
+    return import_tables(mapping, source, folder / 'bags', kinds)
+
+
+@pytest.mark.parametrize('every', [2, 10, 25])
+def test_blanks_belong_to_the_slower_stream(tmp_path: Path, every: int) -> None:
+    slow = [f'{x:.4f}' if row % every == 0 else '' for row, x in enumerate(X)]
+    csv(np.arange(N), X, slow, names='t,x,y')(tmp_path)
+    time = {'column': 't', 'unit': 'ms'}
+    streams = {'signal': {'columns': ['x'], 'time': time}, 'signal_static': {'columns': ['y'], 'time': time}}
+    report = run(tmp_path, streams=streams)
+    assert (report.rates_hz['signal'], report.rates_hz['signal_static']) == pytest.approx(
+        (1000, 1000 / every), rel=0.01
+    )
+    [slow_read], _ = SlideDataset.from_bags(report.bags).to_numpy('signal_static')
+    np.testing.assert_allclose(slow_read[:, 0], X[::every], atol=1e-3)
+
+
+@pytest.mark.parametrize('per_row', [2, 22, 100])
+def test_consecutive_samples_of_a_row_are_one_channel(tmp_path: Path, per_row: int) -> None:
+    pac, slow = np.random.default_rng(0).normal(size=(per_row, 120)), np.arange(120.0)
+    scipy.io.savemat(tmp_path / 'cork_1.mat', {'pac': pac, 'pdc': slow[None]})
+    signal = {'columns': ['pac.*'], 'rate_hz': 100.0 * per_row, 'samples_per_row': per_row}
+    static = {'columns': ['pdc'], 'rate_hz': 100.0}
+    report = run(tmp_path, streams={'signal': signal, 'signal_static': static}, format={'transpose': True})
+    [samples], _ = SlideDataset.from_bags(report.bags).to_numpy()
+    np.testing.assert_allclose(samples[:, 0], pac.T.ravel(), atol=1e-6)
+
+
+ACC = np.stack([X, 2 * X], axis=1)
+
+
+def struct_array(path: Path) -> None:
+    kind = [('acc', object), ('material', object)]
+    data = np.array([(ACC, 'cork'), (3 * ACC, 'felt')], dtype=kind)
+    scipy.io.savemat(path / 'a_1.mat', {'data': data})
+
+
+def nested_structs(path: Path) -> None:
+    inner = {'acc': ACC, 'material': 'cork'}
+    scipy.io.savemat(path / 'a_1.mat', {'data': {'run1': inner, 'run2': {**inner, 'material': 'felt'}}})
+
+
+def cell_of_structs(path: Path) -> None:
+    cells = np.empty(2, object)
+    cells[:] = [{'acc': ACC, 'material': 'cork'}, {'acc': ACC, 'material': 'felt'}]
+    scipy.io.savemat(path / 'a_1.mat', {'data': cells})
+
+
+def hdf5_groups(path: Path) -> None:
+    with h5py.File(path / 'a_1.h5', 'w') as file:
+        for number, material in enumerate(('cork', 'felt'), 1):
+            file[f'data/{number}/acc'], file[f'data/{number}/material'] = ACC, material
+
+
+def matlab73_struct_array(path: Path) -> None:
+    with h5py.File(path / 'a_1.mat', 'w', userblock_size=512) as file:
+        reference = h5py.special_dtype(ref=h5py.Reference)
+        for name in ('acc', 'material'):
+            file.create_dataset(f'data/{name}', (1, 2), dtype=reference)
+        for number, material in enumerate(('cork', 'felt')):
+            file[f'#refs#/a{number}'] = ACC.T
+            text = file.create_dataset(f'#refs#/m{number}', data=np.frombuffer(material.encode(), 'u1').astype('u2'))
+            text.attrs['MATLAB_class'] = np.bytes_('char')
+            file['data/acc'][0, number] = file[f'#refs#/a{number}'].ref
+            file['data/material'][0, number] = text.ref
+    with (path / 'a_1.mat').open('r+b') as opened:
+        opened.write(b'MATLAB 7.3 MAT-file')
+
+
+@pytest.mark.parametrize('write', [struct_array, nested_structs, cell_of_structs, hdf5_groups, matlab73_struct_array])
+def test_elements_of_structs_cells_and_groups_are_slides(tmp_path: Path, write: Callable[[Path], None]) -> None:
+    write(tmp_path)
+    stream = {'columns': ['acc.*'], 'rate_hz': 100.0}
+    report = run(tmp_path, files='*', tables='data/{i}', streams={'signal': stream}, label={'column': 'material'})
+    assert report.slides == {'cork': 1, 'felt': 1}
+    [samples, _], _ = SlideDataset.from_bags(report.bags).to_numpy()
+    np.testing.assert_allclose(samples, ACC, atol=1e-6)
+
+
+CUSTOM = 'lab_msgs/msg/Touch'
+
+
+def write_custom_bag(path: Path) -> Path:
+    store = message_types()
+    store.register(get_types_from_msg('float32[2] taxels\nfloat64 force\nstring note', CUSTOM))
+    with Writer(path, version=8, storage_plugin=StoragePlugin.MCAP) as writer:
+        connection = writer.add_connection('/touch', CUSTOM, typestore=store)
+        for number in range(400):
+            value = store.types[CUSTOM](taxels=np.full(2, X[number], np.float32), force=1.5, note='')
+            writer.write(connection, 10**18 + number * 10_000_000, store.serialize_cdr(value, CUSTOM))
+    return path
+
+
+def test_custom_messages_are_read_by_the_definition_in_the_bag_however_it_was_left(tmp_path: Path) -> None:
+    whole = write_custom_bag(tmp_path / 'whole' / 'cork_1')
+    content = (whole / 'cork_1.mcap').read_bytes()
+    metadata = (whole / 'metadata.yaml').read_text()
+    for name in ('loose', 'killed', 'cut', 'unnamed'):
+        folder = tmp_path / name
+        bag = folder if name == 'loose' else folder / 'cork_1'
+        bag.mkdir(parents=True)
+        (bag / 'cork_1.mcap').write_bytes(content[: -len(content) // 8] if name == 'cut' else content)
+        if name == 'unnamed':
+            (bag / 'metadata.yaml').write_text(metadata.replace('storage_identifier: mcap', "storage_identifier: ''"))
+    stream = {'columns': ['/touch/taxels.*']}
+    for name in ('whole', 'loose', 'killed', 'unnamed', 'cut'):
+        loose = {'files': '{material}_{run}.mcap', 'source': tmp_path / name / 'cork_1.mcap'}
+        where = loose if name == 'loose' else {'files': '{material}_{run}'}
+        report = run(tmp_path / name, ('bag',), streams={'signal': stream}, **where)
+        assert report.streams['cork', 'signal']['samples'] == 400, name
+        assert bool(report.left_out['bags were cut off, and end with their last whole part']) is (name == 'cut')

@@ -150,16 +150,6 @@ def test_arrays_of_a_form_are_a_table_each_with_what_their_names_hold(tmp_path: 
         tables(tmp_path / 'a.npz', mapping(tables='run{n}'))
 
 
-def test_trials_of_a_three_dimensional_array_follow_each_other(tmp_path: Path) -> None:
-    samples = np.arange(4 * 5 * 2.0).reshape(4, 5, 2)
-    np.savez(tmp_path / 'a.npz', X=samples, y=np.array([0, 1, 1, 0]))
-    [table] = tables(tmp_path / 'a.npz')
-    read = table.read(['X.0', 'X.1'], ['y', 'trial'])
-    np.testing.assert_array_equal(read.numbers['X.1'], samples[..., 1].ravel())
-    assert read.texts['y'].tolist() == ['0'] * 5 + ['1'] * 10 + ['0'] * 5
-    assert read.texts['trial'].tolist()[4:6] == ['0', '1']
-
-
 def test_links_out_of_an_hdf5_file_are_not_followed(tmp_path: Path) -> None:
     with h5py.File(tmp_path / 'secret.h5', 'w') as other:
         other['x'] = X
@@ -174,7 +164,7 @@ def test_links_out_of_an_hdf5_file_are_not_followed(tmp_path: Path) -> None:
     ('text', 'form'),
     [
         ('a;b\n1,5;2\n3,25;4\n', {'decimal': ','}),
-        ('// note\n1.5 2\n3.25 4\n', {'comment': '//', 'header': False}),
+        ('# note\n1.5 2\n3.25 4\n', {'header': False}),
         ('units\na|b\n"1.5"|2\n3.25|4\n', {'skip_rows': 1}),
         ('\ufeffa,b\r\n1.5,2\r\n\r\n3.25,4\r\n', {}),
     ],
@@ -204,7 +194,18 @@ def test_a_quote_that_is_never_closed_spoils_its_own_row_alone(tmp_path: Path) -
         ('{m}.csv', '.csv', None),
         ('{m}_{}.csv', 'felt_.csv', {'m': 'felt'}),
         ('*', 'a.csv', {}),
+        ('{m}_{code:d}_{run:d}.csv', 'kitchen_towel_120_01.csv', {'m': 'kitchen_towel', 'code': '120', 'run': '01'}),
+        ('{m}_{run:d}.csv', 'oak_board_1.csv', {'m': 'oak_board', 'run': '1'}),
     ],
 )
 def test_a_template_takes_names_apart(template: str, name: str, fields: dict[str, str] | None) -> None:
     assert template_fields(template, name) == fields
+
+
+@pytest.mark.parametrize(('template', 'name'), [
+    ('{m}_{code}_{run}.csv', 'kitchen_towel_120_01.csv'), ('{m}-{v}.csv', 'a-b-1.csv'),
+    ('{m}.{n}.csv', 'a.b.1.csv'), ('{m}_{n}/{r}.csv', 'oak_board_1/2.csv'), ('*_{m}_*.csv', '1_1_2_1_1.csv'),
+])  # fmt: skip
+def test_a_name_that_fits_in_two_ways_is_refused_and_shows_both(template: str, name: str) -> None:
+    with pytest.raises(InvalidData, match=r'in two ways: .*; or .*'):
+        template_fields(template, name)

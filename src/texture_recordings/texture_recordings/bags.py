@@ -250,15 +250,8 @@ def typestore() -> Typestore:
     return store
 
 
-# Not among the messages of ROS 2 itself.
-AUDIO: Mapping[str, str] = {
-    'audio_common_msgs/msg/AudioData': 'uint8[] data',
-    'audio_common_msgs/msg/AudioDataStamped': 'std_msgs/Header header\nAudioData audio',
-}
-
-
 def message_types(connection: Connection | None = None) -> Typestore:
-    """Return message types by the definition that a bag stores for a connection, else those of ROS 2 and of sound."""
+    """Return message types by the definition that a bag stores for a connection, else those of ROS 2."""
     definition = connection.msgdef if connection else None
     if connection and definition and definition.format is MessageDefinitionFormat.MSG:
         typestore = get_typestore(Stores.EMPTY)
@@ -266,10 +259,7 @@ def message_types(connection: Connection | None = None) -> Typestore:
         # Constants and defaults are left out: of a file nothing but names, as the grammar allows them, becomes code.
         typestore.register({name: ([], fields) for name, (_, fields, *_) in parsed.items()})
         return typestore
-    store = get_typestore(Stores.ROS2_JAZZY)
-    for name, text in AUDIO.items():
-        store.register(get_types_from_msg(text, name))
-    return store
+    return get_typestore(Stores.ROS2_JAZZY)
 
 
 CODEC = MessageCodec(

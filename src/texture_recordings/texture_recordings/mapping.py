@@ -5,9 +5,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from itertools import islice
 from pathlib import Path
 
 from texture_core.config import find_file, load_yaml, param, tree_from_mapping, unknown_name
@@ -24,47 +23,27 @@ def template_fields(template: str, name: str) -> dict[str, str] | None:
     A field in braces is one character or more without '/', `{run:d}` digits alone, '*' and '{}' any text that is not
     kept.
     """
-    found: list[dict[str, str]] = []
-    for fields in islice(_fits(template, name), 100):
-        if fields not in found:
-            found.append(fields)
-        if len(found) > 1:
-            one, other = (', '.join(f'{key}={text}' for key, text in fields.items()) for fields in found)
-            raise InvalidData(
-                f"'{name}' fits '{template}' in two ways: {one}; or {other}; write a part that tells them apart, or "
-                'digits as {code:d}, or rename the files'
-            )
-    return found[0] if found else None
-
-
-def _fits(template: str, name: str) -> Iterator[dict[str, str]]:
-    """Yield the fields of a name in each way in which it is of the form of a template."""
-    first, *literals = FIELD.sub('\0', template).split('\0')
-    fields = [(match[1] or '', match[2] is not None) for match in FIELD.finditer(template)]
-    dead: set[tuple[int, int]] = set()  # so that no name takes long
-
-    def rest(number: int, at: int) -> Iterator[dict[str, str]]:
-        if number == len(fields):
-            if at == len(name):
-                yield {}
-            return
-        (field_name, digits), literal = fields[number], literals[number]
-        if (number, at) in dead:
-            return
-        fits, end = False, at + bool(field_name)
-        while (end := name.find(literal, end)) >= 0:
-            text = name[at:end]
-            if '/' in text or (digits and not text.isdigit()):
-                break
-            for others in rest(number + 1, end + len(literal)):
-                fits = True
-                yield {**({field_name: text} if field_name else {}), **others}
-            end += 1
+    # If fields that are as long as can be and such that are as short as can be are the same, there is but one way.
+    found = []
+    for most in ('', '?'):
+        pattern, end = '', 0
+        for match in FIELD.finditer(template):
+            field = '[0-9]' if match[2] else '[^/]'
+            pattern += f'{re.escape(template[end : match.start()])}({field}{"+" if match[1] else "*"}{most})'
+            end = match.end()
+        fits = re.fullmatch(pattern + re.escape(template[end:]), name, re.DOTALL)
         if not fits:
-            dead.add((number, at))
-
-    if name.startswith(first):
-        yield from rest(0, len(first))
+            return None
+        found.append(fits.groups())
+    names = [match[1] or '' for match in FIELD.finditer(template)]
+    if any(names) and found[0] != found[1]:
+        one, other = (', '.join(f'{key or "*"}={text}' for key, text in zip(names, fields, strict=True))
+                      for fields in reversed(found))  # fmt: skip
+        raise InvalidData(
+            f"'{name}' fits '{template}' in two ways: {one}; or {other}; write a part that tells them apart, or "
+            'digits as {code:d}, or rename the files'
+        )
+    return {key: text for key, text in zip(names, found[0], strict=True) if key}
 
 
 def _checked_template(template: str) -> None:
@@ -77,7 +56,7 @@ def _checked_template(template: str) -> None:
 
 
 TIME_UNITS: Mapping[str, float] = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'min': 60.0}
-BORDERS = ('file', 'column', 'pause', 'time', 'row')
+BORDERS = ('file', 'column', 'pause', 'row')
 
 
 @dataclass(frozen=True)
@@ -86,7 +65,6 @@ class FileFormat:
 
     delimiter: str = param('', "Character between columns of a text file; '' finds one of , ; tab | or space.")
     decimal: str = param('.', 'Decimal sign of numbers in a text file.', choices=('.', ','))
-    comment: str = param('#', "Lines of a text file that begin with it are skipped; '' skips none.")
     skip_rows: int = param(0, 'Number of lines of a text file that are skipped at its top.', low=0, high=10_000)
     header: bool = param(True, 'Says whether a row with names of columns comes first; without, they count from 0.')
     transpose: bool = param(False, 'Says whether arrays are (n_channels, n_samples) and not (n_samples, n_channels).')
@@ -129,7 +107,11 @@ class StreamColumns:
         0.0, 'Sampling rate; 0 takes it from the column of time, or from the file.', unit='Hz', low=0.0, high=MAX_HZ
     )
     samples_per_row: int = param(
-        0, 'Number of successive columns that are consecutive samples of one channel; 0 as 1.', low=0, high=1_000_000
+        0,
+        'Number of successive columns that are consecutive samples of one channel; 0 as 1, for three columns at most '
+        'that count up.',
+        low=0,
+        high=1_000_000,
     )
     time: TimeColumn = field(default_factory=TimeColumn)
 
@@ -162,7 +144,7 @@ class SlideBorders:
     by: str = param(
         'file',
         "Says what ends a slide: 'file' (each file or table is one slide), 'column' (a value changes), 'pause' (time "
-        "jumps by `pause_s` or back), 'time' (every `length_s`) or 'row' (each row is one, see `samples_per_row`).",
+        "jumps by `pause_s`, also back) or 'row' (each row is one, see `samples_per_row`).",
         choices=BORDERS,
     )
     column: str = param('', "Names the column whose value changes between slides, for 'column'.")
@@ -171,9 +153,6 @@ class SlideBorders:
         "Values of the column at which the finger slides, or patterns of them ('pass *'); [] takes all but empty ones.",
     )
     pause_s: float = param(0.5, "Shortest pause between slides, for 'pause'.", unit='s', low=0.0)
-    length_s: float = param(5.0, "Length of a slide, for 'time'.", unit='s', low=0.05)
-    start_s: float = param(0.0, 'Time at the start of each slide that is left out.', unit='s', low=0.0)
-    end_s: float = param(0.0, 'Time at the end of each slide that is left out.', unit='s', low=0.0)
     min_s: float = param(0.2, 'Shortest slide that is kept; shorter ones are counted.', unit='s', low=0.0)
 
 

@@ -23,71 +23,20 @@ from texture_recordings.bags import DELAY_NS, PAUSE_NS, START_NS, BagWriter, sli
 from texture_recordings.slides import parse_selection
 
 # --------------------
-# A slide of the BioTac data set, and how the finger moved in it.
+# The BioTac recordings of 20 materials × 40 slides, as labelled bags.
+#
+# Source: github dexrob/BioTac_slide_20_50 (Gao et al. 2020, "Supervised Autoencoder Joint Learning on Heterogeneous
+# Tactile Sensory Data"), cut into one `materialNN.npz` a material.
 
 FRAME_NS = 10_000_000  # a frame every 10 ms; its recorded times jitter by the host's scheduling
 # Every slide is cut to the length of the shortest material, or its length would reveal the label. The finger runs at
 # speed from the first frame on.
 SLIDE_FRAMES = 600
 LONGEST_S = 1000.0  # of one slide; frames that are missing are counted, however many
-
-
 LAST_EPOCH_S = 2.0**31 - 1e6  # a stamp of ROS has 31 bits for seconds, and all slides follow each other
 NORMAL_FORCE = 2  # column of `wrench`: y of the tool, the one component that presses whatever the direction of travel
-
-
-@dataclass(frozen=True, eq=False)
-class BiotacSlide:
-    """One slide as recorded; the fields of the arrays are named as in the files."""
-
-    surface: str
-    slide: str
-    frames: AnyArray  # (n_frames, 44) counts
-    frame_time: AnyArray  # (n_frames,) s
-    velocity: AnyArray  # (m, 4): time s, x, y, z m/s
-    wrench: AnyArray  # (k, 7): time s, fx, fy, fz N, tx, ty, tz N m
-    epoch: float  # Unix time of the first frame, s
-
-    def __post_init__(self) -> None:
-        columns = {'frames': 44, 'velocity': 4, 'wrench': 7}
-        wrong = [name for name, count in columns.items() if np.shape(getattr(self, name))[1:] != (count,)]
-        if wrong or self.frame_time.shape != (len(self.frames),) or not len(self.frames):
-            raise ValueError(f"the arrays of '{self.slide}' have the shapes of no slide")
-        if not np.isfinite(self.frame_time).all() or np.ptp(self.frame_time) > LONGEST_S:
-            raise ValueError(f"the frames of '{self.slide}' are not within {LONGEST_S:g} s")
-        if not 0 <= self.epoch < LAST_EPOCH_S:
-            raise ValueError(f"'{self.slide}' began at {self.epoch:g} s; Unix time from 0 is needed")
-
-    def named(self) -> ExplorationState:
-        """Return a state of the slide with its names and its direction."""
-        velocity = _measured(self.velocity)
-        x, y = velocity[:, 1:3].mean(axis=0) if len(velocity) else (math.nan, math.nan)
-        name = f'{self.surface}/{self.slide}'
-        return ExplorationState(
-            0, name, 'linear_slide', Phase.SLIDE, direction_rad=math.atan2(y, x), surface=self.surface
-        )
-
-    def speed_and_force(self, time_s: float) -> tuple[float, float]:
-        """Return the speed, m/s, and the normal force, N, at a time of the slide; NaN if they were not measured."""
-        velocity, wrench = _measured(self.velocity), _measured(self.wrench)
-        speed = np.hypot(velocity[:, 1], velocity[:, 2])
-        return _at(time_s, velocity[:, 0], speed), _at(time_s, wrench[:, 0], wrench[:, NORMAL_FORCE])
-
-
-def _measured(rows: AnyArray) -> AnyArray:
-    return rows[np.isfinite(rows).all(axis=1)]
-
-
-def _at(time_s: float, times: AnyArray, values: AnyArray) -> float:
-    return float(np.interp(time_s, times, values)) if len(times) else math.nan
-
-
-# --------------------
-# The BioTac recordings of 20 materials × 40 slides, as labelled bags.
-#
-# Source: github dexrob/BioTac_slide_20_50 (Gao et al. 2020, "Supervised Autoencoder Joint Learning on Heterogeneous
-# Tactile Sensory Data"), cut into one `materialNN.npz` a material.
-
+# Arrays of a slide, and their columns: counts; m/s behind the time, s; N and N m behind the time.
+COLUMNS = {'frames': 44, 'velocity': 4, 'wrench': 7}
 PAC_PER_FRAME = 22
 PAC_COLUMNS = slice(3, 3 + PAC_PER_FRAME)
 STATIC_CHANNELS = ('tdc', 'tac', 'pdc', *(f'electrode{i}' for i in range(1, 20)))
@@ -95,7 +44,6 @@ STATIC_COLUMNS = (0, 1, 2, *range(25, 44))
 BIOTAC_BATCH_S = 0.02
 STATE_BATCHES = 5  # a state every 0.1 s
 LOST_AFTER_S = 0.025  # frame times jitter by up to 8 ms; a larger step is a loss
-FIELDS = ('frames', 'frame_time', 'velocity', 'wrench')
 
 
 def import_biotac20(source: str | Path, out: str | Path, slides: str = '', materials: Sequence[str] = ()) -> list[Path]:
@@ -123,24 +71,33 @@ def _import_material(file: Path, out: Path, wanted: frozenset[int] | None) -> Pa
         raise InvalidData(f"'{file}' has none of the requested slides; it has 1 to 40")
     ready_ns, next_frame = 0, 0
     with BagWriter(out) as bag:
-        for recording in recordings:
+        for slide, arrays in recordings:
             # Where the recording computer's clock went back, a slide follows the one before.
-            start_ns = max(round(recording.epoch * 1000) * 1_000_000, ready_ns)
-            indices = next_frame + frame_indices(recording.frame_time[:SLIDE_FRAMES])
-            _write_slide(bag, recording, start_ns, indices)
+            start_ns = max(round(float(arrays['epoch']) * 1000) * 1_000_000, ready_ns)
+            indices = next_frame + frame_indices(arrays['frame_time'][:SLIDE_FRAMES])
+            _write_slide(bag, f'{file.stem}/{slide}', arrays, start_ns, indices)
             next_frame = int(indices[-1]) + 1
             ready_ns = start_ns + (next_frame - int(indices[0])) * FRAME_NS + PAUSE_NS
     return out
 
 
-def _recordings(file: Path, wanted: frozenset[int] | None) -> Iterator[BiotacSlide]:
+def _recordings(file: Path, wanted: frozenset[int] | None) -> Iterator[tuple[str, dict[str, AnyArray]]]:
+    """Yield slides and their arrays: those of COLUMNS, the times of the frames and the Unix time of the first, s."""
     try:
         with open_regular(file) as opened:
             content = Arrays(opened)
             for slide in sorted({key.split('/')[0] for key in content.names}):
                 if wanted is None or int(slide.removeprefix('slide')) in wanted:
-                    fields = {name: content[f'{slide}/{name}'] for name in FIELDS}
-                    yield BiotacSlide(file.stem, slide, epoch=float(content[f'{slide}/epoch']), **fields)
+                    arrays = {name: content[f'{slide}/{name}'] for name in (*COLUMNS, 'frame_time', 'epoch')}
+                    count, frame_time = len(arrays['frames']), arrays['frame_time']
+                    wrong = [name for name, columns in COLUMNS.items() if arrays[name].shape[1:] != (columns,)]
+                    if wrong or frame_time.shape != (count,) or not count:
+                        raise ValueError(f"the arrays of '{slide}' have the shapes of no slide")
+                    if not np.isfinite(frame_time).all() or np.ptp(frame_time) > LONGEST_S:
+                        raise ValueError(f"the frames of '{slide}' are not within {LONGEST_S:g} s")
+                    if not 0 <= float(arrays['epoch']) < LAST_EPOCH_S:
+                        raise ValueError(f"'{slide}' began at {arrays['epoch']} s; Unix time from 0 is needed")
+                    yield slide, arrays
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InvalidData(f"'{file}' is not a file of this data set: {error}; fetch it again") from error
 
@@ -169,9 +126,9 @@ def restore_sign(rectified: AnyArray) -> Array:
     return x * signs
 
 
-def _write_slide(bag: BagWriter, recording: BiotacSlide, start_ns: int, indices: AnyArray) -> None:
+def _write_slide(bag: BagWriter, name: str, arrays: Mapping[str, AnyArray], start_ns: int, indices: AnyArray) -> None:
     """Write one slide: a state every 0.1 s, the samples, then the end; `indices` number the frames."""
-    frames, first = recording.frames[: len(indices)], int(indices[0])
+    frames, first = arrays['frames'][: len(indices)], int(indices[0])
     places = indices - first
     vibration, fast_places = restore_sign(frames[:, PAC_COLUMNS].ravel())[:, None], np.arange(PAC_PER_FRAME)
     streams = {
@@ -182,10 +139,16 @@ def _write_slide(bag: BagWriter, recording: BiotacSlide, start_ns: int, indices:
     for topic, (like, samples, index) in streams.items():
         batches = list(slide_batches(like, samples, index, start_ns, batch_s=BIOTAC_BATCH_S))
         messages += [(batch.end_ns + DELAY_NS, topic, batch) for batch in batches]
-    named, stop_ns = recording.named(), start_ns + (int(places[-1]) + 1) * FRAME_NS
+    velocity, wrench = (arrays[key][np.isfinite(arrays[key]).all(axis=1)] for key in ('velocity', 'wrench'))
+    x, y = velocity[:, 1:3].mean(axis=0) if len(velocity) else (math.nan, math.nan)
+    named = ExplorationState(
+        0, name, 'linear_slide', Phase.SLIDE, direction_rad=math.atan2(y, x), surface=name.partition('/')[0]
+    )
+    stop_ns = start_ns + (int(places[-1]) + 1) * FRAME_NS
     for stamp_ns in (batch.stamp_ns for batch in batches[::STATE_BATCHES]):
         since_s = (stamp_ns - start_ns) / NANOSECONDS
-        speed_m_s, force_n = recording.speed_and_force(since_s)
+        speed_m_s = _at(since_s, velocity[:, 0], np.hypot(velocity[:, 1], velocity[:, 2]))
+        force_n = _at(since_s, wrench[:, 0], wrench[:, NORMAL_FORCE])
         steady_s = min(STATE_BATCHES * BIOTAC_BATCH_S, (stop_ns - stamp_ns) / NANOSECONDS)
         state = replace(
             named, stamp_ns=stamp_ns, steady_s=steady_s, speed_m_s=speed_m_s, force_n=force_n,
@@ -198,6 +161,11 @@ def _write_slide(bag: BagWriter, recording: BiotacSlide, start_ns: int, indices:
             (after_ns + 2 * DELAY_NS, 'exploration', replace(named, stamp_ns=after_ns, phase=phase, progress=1.0))
         )
     bag.write_all(messages)
+
+
+def _at(time_s: float, times: AnyArray, values: AnyArray) -> float:
+    """Return what was measured at a time; NaN if nothing was."""
+    return float(np.interp(time_s, times, values)) if len(times) else math.nan
 
 
 def _like(part: str, channels: tuple[str, ...], first_frame: int) -> TactileSignal:

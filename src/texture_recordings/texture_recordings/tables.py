@@ -13,7 +13,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import groupby, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +36,6 @@ from texture_core.types import (
 from texture_recordings.bags import DELAY_NS, PAUSE_NS, START_NS, BagWriter, is_bag, is_cut_off, slide_batches
 from texture_recordings.clock import (
     MAX_LEFT_OUT,
-    RESET_ROWS,
     SAME_RATE,
     TIMES,
     ClockFault,
@@ -55,17 +54,27 @@ from texture_recordings.mapping import (
     TableMapping,
     template_fields,
 )
-from texture_recordings.readers import EXAMPLES, MAPPED, OTHER_KINDS, Columns, TableFrame, frames, kind_of, number_of
+from texture_recordings.readers import (
+    EXAMPLES,
+    MAPPED,
+    OTHER_KINDS,
+    TRIAL,
+    Columns,
+    TableFrame,
+    frames,
+    kind_of,
+    number_of,
+)
 
 PLAUSIBLE_HZ, LIKELY_HZ = (5.0, 200_000.0), (20.0, 20_000.0)
 LONGEST_SLIDE_S = 1800.0
 STATE_S = 0.1  # a state so often where a condition changes along a slide
 SAME_TIME_S = 1e-9
-WIDE = 100  # columns name_1 … name_n beyond this are hardly channels
+MAX_NUMBERED = 3  # columns name_1 … name_n beyond this may be samples: the mapping has to tell
 MAX_SLIDES = 20_000  # of one file
 COPIED_ROWS = 3
-MAX_ALTERNATING = 6  # sensors of which one row each follows the other
-MAX_PEEKED = 40  # columns in which they are looked for
+MAX_ALTERNATING = 100  # sensors of which one row each follows the other
+PEEKED_COLUMNS, PEEKED_ROWS = 40, 2000  # in which they are looked for
 # Lowest and highest mean of a slide that a tactile finger reaches, in SI units.
 PLAUSIBLE: Mapping[str, tuple[float, float]] = {
     'speed': (5e-5, 2.0), 'force': (1e-3, 100.0), 'direction': (-6.3, 6.3),
@@ -154,8 +163,8 @@ def import_tables(
     with SlideBags(mapping, out) as bags:
         for path, place, fields in progress(_files(mapping, Path(source), kinds, report), 'import files'):
             for frame in frames(path, place, mapping):
-                for session, named, streams, conditions in FrameSlides(mapping, frame, fields, report).slides():
-                    bags.write(session, named, streams, conditions)
+                for slide in FrameSlides(mapping, frame, fields, report).slides():
+                    bags.write(*slide)
             if path.is_dir() or path.suffix == '.mcap':
                 cut = is_cut_off(path)
                 report.leave_out('bags were cut off, and end with their last whole part', int(cut), f"'{place}'; see "
@@ -201,10 +210,10 @@ def _files(
 def _refuse_as_file(folder: Path, source: Path, mapping: TableMapping, kinds: Sequence[str]) -> None:
     """Refuse a folder with the name of a file that is wanted, or with the parts of a bag that cannot be read."""
     place = folder.relative_to(source).as_posix()
+    parts = sorted(one.name for one in folder.iterdir() if 'bag' in kinds and one.suffix in ('.mcap', '.db3'))
     if template_fields(mapping.files, place) is None:
         return
-    parts = sorted(one.name for one in folder.iterdir() if one.suffix in ('.mcap', '.db3'))
-    if 'bag' in kinds and parts:
+    if parts:
         raise InvalidData(
             f"'{place}' holds {', '.join(parts[:3])} without metadata.yaml; write it anew: ros2 bag reindex"
         )
@@ -248,38 +257,34 @@ class FrameSlides:
         self._fields = {**frame.fields, **fields}
         self._chosen = {name: frame.chosen(stream.columns) for name, stream in mapping.streams.items()}
         self._columns = self._read()
+        self._refuse_alternating()
         self._check_rows()
-        streams = [self._stream(name, params) for name, params in mapping.streams.items()]
+        self._streams = [self._rated(self._stream(name, params)) for name, params in mapping.streams.items()]
         # Slides are cut by the rows of the stream that corresponds to the column at which they end.
         by = mapping.slides.column
-        same = [one for one in streams if by and by not in self._fields and one.group == self._group(by)]
-        self._reference = max(same or streams[:1], key=lambda one: len(one.rows))
-        self._spans = self._cut()
-        self._streams = [self._rated(one) for one in streams]
+        same = [one for one in self._streams if by and by not in self._fields and one.group == self._group(by)]
+        self._reference = max(same or self._streams[:1], key=lambda one: len(one.rows))
         self._check_shared_rows()
-        self._refuse_alternating()
-        if frame.trials > 1 and mapping.slides.by != 'column' and not self._timed():
-            raise InvalidData(f"'{self._place}' has {frame.trials} trials; write slides: {{by: column, column: trial}}")
-        self._reference = next(one for one in self._streams if one.name == self._reference.name)
+        untimed = any(one.time_s is None for one in self._streams)
+        if TRIAL in frame.names and mapping.slides.by != 'column' and untimed:
+            raise InvalidData(f"'{self._place}' has trials; write slides: {{by: column, column: {TRIAL}}}")
 
     def slides(self) -> Iterator[tuple[str, ExplorationState, SlideStreams, Conditions]]:
         """Yield what `SlideBags.write` takes."""
         params, short, inside = self._mapping.slides, 0, 0
         reference, times = self._reference, self._reference.at_s()
-        for number, span in enumerate(self._spans, 1):
-            skip, drop = (round(seconds * reference.rate_hz) for seconds in (params.start_s, params.end_s))
-            rows = slice(span.start + skip, max(span.start + skip, span.stop - drop))
-            inside += max(0, span.stop - span.start)
-            count = (rows.stop - rows.start) * reference.per_row
-            if count < 2 or count / (reference.rate_hz * reference.per_row) < params.min_s - 1e-9:
-                short += span.stop - span.start
+        for number, span in enumerate(self._cut(), 1):
+            rows = span.stop - span.start
+            count, inside = rows * reference.per_row, inside + rows
+            if count < 2 or rows / reference.rate_hz < params.min_s - 1e-9:
+                short += rows
                 self._report.leave_out(
                     'slides are too short', 1, f"'{self._place}', row {self._line(span.start)}: {count} samples"
                 )
                 continue
             if number > MAX_SLIDES:
                 raise InvalidData(f"'{self._place}' has more than {MAX_SLIDES} slides; split it")
-            yield self._slide(times, rows, number)
+            yield self._slide(times, span, number)
         if short > MAX_LEFT_OUT * inside and short < inside and params.min_s == SlideBorders().min_s:
             raise InvalidData(
                 f"'{self._place}': {short} of {inside} rows lie in slides that are shorter than {params.min_s:g} s; "
@@ -317,34 +322,38 @@ class FrameSlides:
         return read
 
     def _refuse_alternating(self) -> None:
-        """Refuse rows of which an unused column, as the name of a sensor, has the same few values again and again."""
+        """Refuse rows of several sensors: an unused column, as of their names, changes in turn or at one time."""
         used = {*self._columns.numbers, *self._columns.texts}
-        unused = [name for name in self._frame.names if name not in used][:MAX_PEEKED]
-        for name, texts in (self._frame.peek(unused) if self._frame.peek and unused else {}).items():
-            values, codes = np.unique(texts, return_inverse=True)
+        unused = [name for name in self._frame.names if name not in used][:PEEKED_COLUMNS]
+        clocks = [one.time.column for one in self._mapping.streams.values() if one.time.column in self._frame.names]
+        peeked = self._frame.read([], list({*unused, *clocks}), PEEKED_ROWS).texts if unused else {}
+        for name in unused:
+            values, codes = np.unique(peeked[name], return_inverse=True)
             count = len(values)
-            if 2 <= count <= MAX_ALTERNATING and len(texts) >= 10 * count and (codes[count:] == codes[:-count]).all():
+            enough = 2 <= count <= MAX_ALTERNATING and len(codes) >= 10 * count
+            if not enough or (codes[1:] != codes[:-1]).mean() < 0.5:
+                continue
+            in_turn = (codes[count:] == codes[:-count]).mean() > 0.9
+            for clock in clocks:
+                times, at = np.unique(peeked[clock], return_inverse=True)
+                pairs = np.unique(at * count + codes) if len(at) == len(codes) else []
+                in_turn |= len(times) < 0.9 * len(at) and len(pairs) == len(codes)
+            if in_turn:
                 raise InvalidData(
-                    f"'{self._place}': the rows have one value of '{name}' after the other ({', '.join(values)}), so "
-                    f"the signals of several sensors may alternate; choose one by rows: {{{name}: '{values[0]}'}}, or "
-                    f"all of one signal by rows: {{{name}: '*'}}"
+                    f"'{self._place}': the rows have one value of '{name}' after the other "
+                    f'({", ".join(values[:5].tolist())}), so the signals of several sensors may alternate; choose one '
+                    f"by rows: {{{name}: '{values[0]}'}}, or all of one signal by rows: {{{name}: '*'}}"
                 )
-
-    def _timed(self) -> bool:
-        return all(one.time_s is not None for one in self._streams)
 
     def _check_shared_rows(self) -> None:
         """Refuse stated rates that contradict the rows which two streams without times share."""
-        rates: dict[tuple[str, int], dict[str, float]] = {}
-        for one in self._streams:
-            if one.time_s is None and len(one.rows) > 1:
-                rates.setdefault(one.group, {})[one.name] = one.rate_hz / float(np.median(np.diff(one.rows)))
-        for found in rates.values():
-            if max(found.values()) > SAME_RATE * min(found.values()):
-                stated = ', '.join(f"{rate_hz:.4g} by '{name}'" for name, rate_hz in found.items())
-                raise InvalidData(
-                    f"'{self._place}': rows per second are {stated}, which share their rows; correct `rate_hz`"
-                )
+        rates = {one.name: one.rate_hz for one in self._streams
+                 if one.time_s is None and one.group == self._reference.group}  # fmt: skip
+        if max(rates.values(), default=1.0) > SAME_RATE * min(rates.values(), default=1.0):
+            stated = ', '.join(f"{rate_hz:.4g} by '{name}'" for name, rate_hz in rates.items())
+            raise InvalidData(
+                f"'{self._place}': rows per second are {stated}, which share their rows; correct `rate_hz`"
+            )
 
     def _line(self, row: int) -> int:
         lines = self._columns.lines
@@ -363,13 +372,10 @@ class FrameSlides:
             for other, columns in self._chosen.items() if other != name
             for column in columns if self._group(column) == group
         ]  # fmt: skip
-        none = np.logical_and.reduce([np.isnan(self._columns.numbers[column]) for column in self._chosen[name]])
-        if not others:
+        if not others or not self._mapping.streams[name].time.column:
             return np.zeros(group[1], dtype=bool)
+        none = np.logical_and.reduce([np.isnan(self._columns.numbers[column]) for column in self._chosen[name]])
         blank: AnyArray = none & np.logical_or.reduce([np.isfinite(column) for column in others])
-        steps = np.diff(np.flatnonzero(~blank))
-        if not self._mapping.streams[name].time.column and len(steps) and np.ptp(steps):
-            blank[:] = False  # by no clock and no pattern can their places be known
         return blank
 
     def _check_rows(self) -> None:
@@ -388,9 +394,6 @@ class FrameSlides:
                 found |= np.isnan(self._columns.numbers[column]) & ~blank
             if (time := self._mapping.streams[name].time.column) and len(self._columns.numbers[time]) == len(found):
                 found |= np.isnan(self._columns.numbers[time])
-        outside = [f"'{self._place}', row {line}" for line in self._columns.outside]
-        self._report.rows += len(outside)
-        self._report.leave_out('rows above or below the samples', len(outside), *outside)
         for length, marked in bad.items():
             junk = self._columns.junk
             found = marked | junk if junk is not None and length == len(junk) else marked
@@ -410,7 +413,6 @@ class FrameSlides:
 
     def _stream(self, name: str, params: StreamColumns) -> Stream:
         names, group = self._chosen[name], self._group(self._chosen[name][0])
-        self._check_width(name, params, names, group[1])
         per_row = params.samples_per_row or 1
         if len(names) % per_row:
             raise InvalidData(
@@ -429,7 +431,7 @@ class FrameSlides:
                 samples[:, place] = self._columns.numbers[column] * params.scale
         if np.isinf(samples).any():
             raise InvalidData(f"'{self._place}': '{name}' has values above 3.4e38; look at the columns and at `scale`")
-        self._check_groups(name, params, names, samples)
+        self._check_groups(name, params, names, len(samples))
         kept, time_s = ~self._blank(name), None
         column = params.time.column or self._frame.clocks.get(names[0], '')
         if column:
@@ -440,6 +442,10 @@ class FrameSlides:
             kept &= np.isfinite(raw)
             unit = TIME_UNITS[params.time.unit if params.time.column else 's']
             time_s = unwrapped(raw[kept]) * unit
+        else:  # rows without any number above the samples and below them are none
+            numbers = [one for one in self._columns.numbers.values() if len(one) == len(kept)]
+            known = np.flatnonzero(np.isfinite(numbers).any(axis=0))
+            kept[: known[0]] = kept[known[-1] + 1 :] = False
         rows = np.flatnonzero(kept)
         self._report.channels.setdefault(name, channels)
         if self._report.channels[name] != channels and len(self._report.channels[name]) != len(channels):
@@ -449,42 +455,26 @@ class FrameSlides:
             )
         return Stream(name, params, channels, samples[rows], rows, time_s, group, per_row)
 
-    def _check_width(self, name: str, params: StreamColumns, names: Sequence[str], rows: int) -> None:
-        """Refuse a row that looks like a window, or an array that lies on its side, unless the mapping tells."""
-        numbered = all(re.fullmatch(r'.*?\d+', one) for one in names)
-        if not params.samples_per_row and len(names) > 8 and (len(names) > rows or (numbered and len(names) > WIDE)):
-            raise InvalidData(
-                f"'{self._place}': the stream '{name}' has {len(names)} columns, {names[0]} … {names[-1]}, and {rows} "
-                f'rows; write samples_per_row: {len(names)} if a row holds that many consecutive samples of one '
-                'channel (slides: {by: row} if it is a window), samples_per_row: 1 if the columns are channels, or '
-                'format: {transpose: true} if the array lies on its side'
-            )
-
-    def _check_groups(self, name: str, params: StreamColumns, names: Sequence[str], samples: AnyArray) -> None:
-        """Refuse columns that are no consecutive samples although the mapping says so, or that seem to be some."""
+    def _check_groups(self, name: str, params: StreamColumns, names: Sequence[str], rows: int) -> None:
+        """Refuse columns that may be consecutive samples unless the mapping tells, or that it wrongly calls so."""
         parts = [re.fullmatch(r'(.*?)(\d{1,9})', one) for one in names]
-        if not all(parts):
-            return
-        stems, numbers = [one[1] for one in parts if one], np.array([int(one[2]) for one in parts if one])
+        follows = [bool(a and b and a[1] == b[1] and int(b[2]) == int(a[2]) + 1) for a, b in pairwise(parts)]
         count = params.samples_per_row
-        if count > 1:
-            groups = [slice(first, first + count) for first in range(0, len(names), count)]
-            if any(len({*stems[one]}) > 1 or (np.diff(numbers[one]) != 1).any() for one in groups):
+        if not count:
+            together = max((len(list(same)) for follow, same in groupby(follows) if follow), default=0) + 1
+            if together > MAX_NUMBERED:
                 raise InvalidData(
-                    f"'{self._place}': the columns of '{name}' are {', '.join(names[:4])} …, whose numbers do not "
-                    f'count up within {count} columns; write them in the order of the samples, such as a range '
-                    f"'{stems[0]}{numbers.min()}-{numbers.max()}'"
+                    f"'{self._place}': the stream '{name}' has {len(names)} columns, {names[0]} … {names[-1]}, and "
+                    f'{rows} rows; write samples_per_row: {together} if a row holds that many consecutive samples of '
+                    'one channel (slides: {by: row} if it is a window), samples_per_row: 1 if the columns are '
+                    'channels, or format: {transpose: true} if the array lies on its side'
                 )
-        elif not count and len(names) > 3 and len({*stems}) == 1 and (np.diff(numbers) == 1).all() and len(samples) > 9:
-            # The last sample of a row is then as near to the first of the next one as neighbours in a row are.
-            next_row = np.abs(samples[1:, 0] - samples[:-1, -1])
-            within, between = np.abs(np.diff(samples, axis=1)), np.abs(np.diff(samples, axis=0))
-            near, far = np.nanmedian(within), np.nanmedian(between)
-            if near > 0 and np.nanmedian(next_row) < 2.0 * near and far > 3.0 * near:
-                raise InvalidData(
-                    f"'{self._place}': the columns {names[0]} … {names[-1]} go on from row to row as consecutive "
-                    f'samples of one channel; write samples_per_row: {len(names)} if they are, 1 if they are channels'
-                )
+        elif all(parts) and not all(follows[at] for at in range(len(follows)) if (at + 1) % count):
+            raise InvalidData(
+                f"'{self._place}': the columns of '{name}' are {', '.join(names[:4])} …, whose numbers do not "
+                f'count up within {count} columns; write them in the order of the samples, such as a range '
+                f"'{parts[0][1]}0-{count - 1}'"  # type: ignore[index]
+            )
 
     def _cut(self) -> list[slice]:
         """Return the rows of the reference in each slide."""
@@ -498,27 +488,10 @@ class FrameSlides:
             keys = self._aligned(params.column)
             changes = np.flatnonzero(keys[1:] != keys[:-1]) + 1
         elif params.by == 'pause' and times is not None and count > 1:
-            ahead = np.lib.stride_tricks.sliding_window_view(
-                np.append(times[1:], np.full(RESET_ROWS, times[-1])), RESET_ROWS + 1
-            )
-            reset = (ahead < times[:-1, None]).all(axis=1)
-            changes = np.flatnonzero((np.diff(times) >= params.pause_s) | reset) + 1
-            self._refuse_copies(reference, times, np.flatnonzero(reset) + 1)
-        elif params.by == 'time':
-            if times is not None and (np.diff(times) < 0).any():
-                row = int(np.argmax(np.diff(times) < 0)) + 1
-                raise InvalidData(self._fault(reference, row, 'time goes back; slides by time need one that goes on'))
-            rate_hz = reference.params.rate_hz / reference.per_row or self._frame.rate_hz
-            since = times - times[0] if times is not None else reference.rows / max(rate_hz, MIN_HZ)
-            number = np.floor(since / params.length_s + 1e-9)
-            changes = np.flatnonzero(np.diff(number)) + 1
-            whole = float(since[-1]) + float(np.median(np.diff(since))) if count > 1 else 0.0
-            count = (
-                count
-                if whole >= (number[-1] + 1) * params.length_s * (1 - 1e-6)
-                else int((changes if len(changes) else [0])[-1])
-            )
-        found = [slice(first, last) for first, last in pairwise([0, *changes[changes < count].tolist(), count])]
+            steps = np.diff(times)
+            changes = np.flatnonzero(np.abs(steps) >= params.pause_s) + 1
+            self._refuse_copies(reference, times, np.flatnonzero(steps <= -params.pause_s) + 1)
+        found = [slice(first, last) for first, last in pairwise([0, *changes.tolist(), count])]
         if keys is None:
             return found
         found = [span for span in found if _slides_at(str(keys[span.start]), params.values)]
@@ -548,24 +521,13 @@ class FrameSlides:
         name, params, per_row = stream.name, stream.params, stream.per_row
         measured, burst_s = self._frame.rate_hz, 0.0
         if stream.time_s is not None:
-            parts = [stream.time_s]
-            if stream.group == self._reference.group:
-                edges = [
-                    (self._reference.rows[one.start], self._reference.rows[one.stop - 1])
-                    for one in self._spans
-                    if one.stop > one.start
-                ]
-                places = [(np.searchsorted(stream.rows, a), np.searchsorted(stream.rows, b, 'right')) for a, b in edges]
-                parts = [stream.time_s[a:b] for a, b in places] or parts
-            parts = [part for part in parts if len(part) > 1] or [stream.time_s]
-            burst_s = burst_step_s(np.concatenate([np.diff(part) for part in parts]))
-            measured = per_row * estimated_rate_hz(parts, burst_s)
+            burst_s = burst_step_s(np.diff(stream.time_s))
+            measured = per_row * estimated_rate_hz(stream.time_s, burst_s)
             if not measured > 0:
                 raise InvalidData(
                     f"'{self._place}': the times of '{name}' do not grow from row to row; give a column of time that "
                     'grows and has enough digits, or `rate_hz` in its place'
                 )
-            self._refuse_mixed(stream, parts, burst_s)
         # Of the first file: windows of all are to have as many samples.
         rate_hz = self._report.rates_hz.get(name) or params.rate_hz or measured
         if measured and not 1 / SAME_RATE <= measured / rate_hz <= SAME_RATE:
@@ -587,60 +549,37 @@ class FrameSlides:
         self._report.rates_hz[name] = rate_hz
         return replace(stream, rate_hz=rate_hz / per_row, burst_s=burst_s)
 
-    def _refuse_mixed(self, stream: Stream, parts: Sequence[Array], burst_s: float) -> None:
-        """Refuse times that come again where an unused column differs between their rows, as the name of a sensor."""
-        whole = np.concatenate(parts)
-        if len(np.unique(whole)) > 0.9 * len(whole) and not (np.diff(whole) < 0).sum() > MAX_LEFT_OUT * len(whole):
-            return
-        used = {*self._columns.numbers, *self._columns.texts}
-        for name in [one for one in self._frame.names if one not in used][:40]:
-            texts = self._frame.read([], [name]).texts[name]
-            texts = texts[stream.rows] if len(texts) == stream.group[1] else texts
-            values, codes = np.unique(texts, return_inverse=True)
-            if len(texts) != len(stream.rows) or not 2 <= len(values) <= len(texts) / 4:
-                continue
-            _, places = np.unique(stream.at_s(), return_inverse=True)
-            if len(np.unique(places.astype(np.int64) * len(values) + codes)) == len(texts):
-                raise InvalidData(
-                    f"'{self._place}': each time occurs once for each value of '{name}' "
-                    f'({", ".join(values[:5].tolist())}), so the signals of several sensors or runs alternate; choose '
-                    f"one by rows: {{{name}: {values[0]}}}, or cut slides at '{name}'"
-                )
-
     def _aligned(self, name: str) -> AnyArray:
-        """Return the texts of a column at the rows of the reference: of another clock, the last one until then."""
-        texts = self._columns.texts[name]
+        """Return a column at the rows of the reference: of another clock, the last value until then."""
+        columns = self._columns
+        values: AnyArray = columns.texts[name] if name in columns.texts else columns.numbers[name]
         if self._group(name) == self._reference.group:
-            return texts[self._reference.rows]
+            return values[self._reference.rows]
         clock, times = self._frame.clocks.get(name), self._reference.time_s
         if clock is None or times is None:
             raise InvalidData(
-                f"'{self._place}': column '{name}' has {len(texts)} rows, as no stream has; name one of the same length"
+                f"'{self._place}': column '{name}' has {len(values)} rows, as no stream has; name one of the same "
+                'length'
             )
-        held = np.searchsorted(self._columns.numbers[clock], times + SAME_TIME_S, 'right') - 1
-        return np.where(held >= 0, texts[np.maximum(held, 0)], '')
+        held = np.searchsorted(columns.numbers[clock], times + SAME_TIME_S, 'right') - 1
+        return np.where(held >= 0, values[np.maximum(held, 0)], '' if name in columns.texts else math.nan)
 
     def _value(self, name: str, rows: slice, kind: str) -> str:
         """Return the one value that a column has during a slide, the last one before it where it has none."""
         if name in self._fields:
             return str(self._fields[name])
-        texts = self._aligned(name)
-        inside = np.flatnonzero(texts[rows] != '') + rows.start
-        before = np.flatnonzero(texts[: rows.start] != '')
-        if not len(inside):
-            if not len(before):
-                raise InvalidData(f"'{self._place}': column '{name}' has no value during a slide; name another")
-            return str(texts[before[-1]])
-        first = str(texts[inside[0]])
-        if inside[0] > rows.start and len(before) and texts[before[-1]] != first:
-            inside, first = np.append(before[-1], inside), str(texts[before[-1]])
-        other = inside[texts[inside] != first]
+        texts = self._aligned(name)[: rows.stop]
+        held = texts[np.maximum.accumulate(np.where(texts != '', np.arange(len(texts)), 0))][rows]
+        known = np.flatnonzero(held != '')
+        if not len(known):
+            raise InvalidData(f"'{self._place}': column '{name}' has no value during a slide; name another")
+        first = str(held[known[0]])
+        other = known[held[known] != first]
         if len(other):
             raise InvalidData(
-                f"'{self._place}', row {self._line(self._reference.rows[other[0]])}, column '{name}': the "
-                f"{kind} changes from '{first}' to '{texts[other[0]]}' within a slide; let slides end "
-                f"where '{name}' changes "
-                '(`slides: {by: column}`)'
+                f"'{self._place}', row {self._line(self._reference.rows[rows.start + other[0]])}, column '{name}': the "
+                f"{kind} changes from '{first}' to '{held[other[0]]}' within a slide; let slides end where '{name}' "
+                'changes (`slides: {by: column}`)'
             )
         return first
 
@@ -659,7 +598,7 @@ class FrameSlides:
             )
         group_rows = reference.rows[rows.start], reference.rows[rows.stop - 1] + 1
         streams = {one.name: self._samples(one, surface, group_rows, begin_s, end_s) for one in self._streams}
-        conditions = self._conditions(group_rows, begin_s, end_s)
+        conditions = self._conditions(times, rows, begin_s, end_s)
         for place, name in enumerate(CONDITION_UNITS, 1):
             known = [state[place] for state in conditions if math.isfinite(state[place])]
             if known:
@@ -740,9 +679,9 @@ class FrameSlides:
             + (f', which may be {" or ".join(likely)}' if likely else '')
         )
 
-    def _conditions(self, group_rows: tuple[int, int], begin_s: float, end_s: float) -> Conditions:
+    def _conditions(self, times: Array, rows: slice, begin_s: float, end_s: float) -> Conditions:
         """Return what holds from 0 on, and every 0.1 s after if a condition changes along the slide."""
-        tracks = {name: self._track(name, group_rows, begin_s, end_s) for name in CONDITION_UNITS}
+        tracks = {name: self._track(name, times, rows) for name in CONDITION_UNITS}
         changing = any(len(values) > 1 and np.ptp(values) > 0 for _, values in tracks.values())
         count = max(1, round((end_s - begin_s) / STATE_S)) if changing else 1
         edges = begin_s + STATE_S * np.arange(count + 1) if changing else np.array([begin_s, math.inf])
@@ -750,36 +689,20 @@ class FrameSlides:
         means = [[_mean(*tracks[name], a, b) for name in CONDITION_UNITS] for a, b in pairwise(edges)]
         return [(start, *mean) for start, mean in zip((edges[:-1] - begin_s).tolist(), means, strict=True)]
 
-    def _track(self, name: str, group_rows: tuple[int, int], begin_s: float, end_s: float) -> tuple[Array, Array]:
+    def _track(self, name: str, times: Array, rows: slice) -> tuple[Array, Array]:
         """Return times and known values of a condition in SI units, (n,) each; a force and a speed without sign."""
         quantity = self._mapping.conditions.get(name, Quantity())
         factor = CONDITION_UNITS[name].get(quantity.unit, 1.0)
         if quantity.column in self._fields or not quantity.column:
             text = self._fields[quantity.column] if quantity.column else quantity.value or 'nan'
             try:
-                values, times = np.array([float(text)]), np.array([begin_s])
+                times, values = times[rows][:1], np.array([float(text)])
             except ValueError as error:
                 raise InvalidParameter(
                     f"'{self._place}': '{quantity.column}' is '{text}' in its name; a number is needed there"
                 ) from error
         else:
-            times = np.empty(0)
-            values, group = self._columns.numbers[quantity.column], self._group(quantity.column)
-            if group == self._reference.group:
-                low, high = np.searchsorted(self._reference.rows, group_rows)
-                rows = self._reference.rows[low:high]
-                times, values = self._reference.at_s()[low:high], values[rows]
-            else:
-                clock = self._frame.clocks.get(quantity.column)
-                if clock is None:
-                    raise InvalidData(
-                        f"'{self._place}': column '{quantity.column}' has {len(values)} rows, as no stream has; name "
-                        'one of the same length'
-                    )
-                times = self._columns.numbers[clock]
-                first, last = np.searchsorted(times, (begin_s - SAME_TIME_S, end_s - SAME_TIME_S))
-                first = max(0, first - 1) if first == last else first  # the last value holds
-                times, values = times[first:last], values[first:last]
+            times, values = times[rows], self._aligned(quantity.column)[rows]
         times, values = times[np.isfinite(values)], values[np.isfinite(values)] * factor
         negative = name != 'direction' and len(values) and values.mean() < 0
         return times, -values if negative else values

@@ -28,5 +28,5 @@ def run(options: argparse.Namespace) -> int:
     requirements = result.numbers['requirements']
     for requirement, found in requirements.items():
         print(f'{"holds" if found["holds"] else "FAILS"}: {requirement}: {found["seen"]}')
-    print(f'  {result.write(options.out)}')
+    print(f'  {result.write(options.out, "endurance", soak.__doc__)}')
     return int(not all(found['holds'] for found in requirements.values()))

@@ -8,9 +8,9 @@ import math
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -22,7 +22,7 @@ from rclpy.node import Node
 from texture_core.errors import DeviceError
 from texture_core.ros import from_msg, to_msg
 from texture_core.ros_testing import NodeProcess
-from texture_core.types import NANOSECONDS, Array, ExplorationState, TactileSignal, TextureEstimate
+from texture_core.types import NANOSECONDS, TactileSignal, TextureEstimate
 from texture_estimation.model import load_model
 from texture_features.windows import INDEX_TOLERANCE
 from texture_recordings.bags import slide_batches
@@ -84,43 +84,6 @@ def _in_namespace(topic: str) -> Topic:
     return found._replace(name=f'{namespace}/{found.name}') if namespace else found
 
 
-Timed = tuple[int, str, Any]  # when it is due, ns since the start; topic; data class
-
-
-class Streamer:
-    """Publish from a separate thread."""
-
-    def __init__(self, graph: Graph, plan: Sequence[Timed]) -> None:
-        publishers = {topic: graph.publisher(topic) for topic in {topic for _, topic, _ in plan}}
-        self._plan = [(due_ns, publishers[topic], to_msg(value)) for due_ns, topic, value in plan]
-        self.publishers = publishers
-        self.topics = [topic for _, topic, _ in plan]
-        self.sent_at_s: list[float] = []
-        self._thread = threading.Thread(target=self._run, name='streamer')
-
-    def start(self) -> None:
-        """Begin."""
-        self._thread.start()
-
-    @property
-    def running(self) -> bool:
-        """Whether there is more to come."""
-        return self._thread.is_alive()
-
-    def join(self) -> None:
-        """Wait for the end."""
-        self._thread.join()
-
-    def _run(self) -> None:
-        start = time.perf_counter()
-        for due_ns, publisher, message in self._plan:
-            ahead_s = due_ns * 1e-9 - (time.perf_counter() - start)
-            if ahead_s > 0:
-                time.sleep(ahead_s)
-            self.sent_at_s.append(time.perf_counter())
-            publisher.publish(message)
-
-
 SETTLE_S = 3.0  # discovery of all subscriptions
 READY_WITHIN_S = 60.0
 DRIVER_S = 10.0
@@ -129,147 +92,105 @@ SPEED_M_S, FORCE_N = 0.1, 2.0
 DOMAIN = 83  # separate: other nodes on the machine must not subscribe
 
 
-@dataclass(frozen=True, eq=False)
-class LiveLatency:
-    """What was measured over one long slide."""
+def measure(
+    model_path: Path, scene: str, surface: str, slide_s: float, *, seed: int, fingers: Sequence[str] = ('',)
+) -> dict[str, Any]:
+    """Stream a simulated slide to each finger, named by its namespace; return how late its estimates come.
 
-    # (n_estimates,) From publishing the batch with the last sample of a window to receiving its estimate
-    latency_s: Array
-    expected: int  # Estimates that should have come
-    cpu: Mapping[str, float]  # Fraction of one core that each node used, 0 to 1
-
-    def numbers(self) -> dict[str, Any]:
-        """Return the figures."""
-        median, p99 = 1000 * np.percentile(self.latency_s, (50, 99))
-        return {
-            'estimates': len(self.latency_s),
-            'expected': self.expected,
-            'median_ms': float(median),
-            'p99_ms': float(p99),
-            'longest_ms': float(1000 * self.latency_s.max()),
-            'cpu_percent': {name: round(100 * load, 1) for name, load in self.cpu.items()},
-        }
-
-
-@dataclass(frozen=True)
-class LiveSlide:
-    """What is streamed to each finger."""
-
-    # scene, surface: which simulated surface is touched
-    scene: str
-    surface: str
-    slide_s: float  # Length of the slide, s
-    seed: int  # Seed of the slide of the first finger; each further one has the next
-
-
-def measure(model_path: Path, slide: LiveSlide, namespaces: Sequence[str] = ('',)) -> Mapping[str, LiveLatency]:
-    """Stream a simulated slide to each of several fingers at once, and time the estimates."""
-    model = load_model(model_path)
-    topics = model.recipe.feature_set.topics
-    fingers = [_Finger.simulated(name, replace(slide, seed=slide.seed + i)) for i, name in enumerate(namespaces)]
+    Time of each estimate since the batch with the last sample of its newest window was published, ms; computing time
+    of the nodes, in percent of one core. The slide of each finger has the next seed.
+    """
+    feature_set = load_model(model_path).recipe.feature_set
+    length_s, hop_s = feature_set.windows.length_s, feature_set.windows.hop_s
+    batches = {finger: dict[str, list[TactileSignal]]() for finger in fingers}
+    received = {finger: list[tuple[float, TextureEstimate]]() for finger in fingers}
+    sent_s: defaultdict[str, list[float]] = defaultdict(list)  # by topic
+    plan: list[tuple[int, str, Any]] = []  # when it is due, ns since the start; topic; data class
+    nodes: list[NodeProcess] = []
     with Graph(DOMAIN) as graph, ExitStack() as stack:
-        for finger in fingers:
-            finger.start(graph, stack, model_path)
-        streamer = Streamer(graph, sorted((timed for f in fingers for timed in f.plan()), key=lambda timed: timed[0]))
-        _wait_for_nodes(graph, streamer, fingers, topics)
-        loads = _stream(graph, streamer, fingers, slide.slide_s + READY_WITHIN_S)
-    windows = model.recipe.feature_set.windows
-    expected = math.floor((slide.slide_s - windows.length_s) / windows.hop_s + 1e-6) + 1
+        # What is streamed to each finger, a state at its stamp and a batch at its end, and its two nodes.
+        for number, finger in enumerate(fingers):
+            states, signals = simulate_exploration(
+                load_scene(scene), surface, SPEED_M_S, FORCE_N, slide_s,
+                start_ns=0, exploration_id='long', rng=np.random.default_rng(seed + number),
+            )  # fmt: skip
+            plan += [(state.stamp_ns, _topic(finger, 'exploration'), state) for state in states]
+            for topic, [first, *others] in signals.items():  # one unbroken stream
+                samples = np.concatenate([first.samples, *(signal.samples for signal in others)])
+                places = np.arange(len(samples))
+                batches[finger][topic] = list(slide_batches(first, samples, places, first.stamp_ns, batch_s=BATCH_S))
+                plan += [(batch.end_ns, _topic(finger, topic), batch) for batch in batches[finger][topic]]
+            for package, node, given in (
+                ('texture_features', 'feature_extractor', {'recipe': str(model_path.with_suffix('.json'))}),
+                ('texture_estimation', 'classifier', {'model': str(model_path)}),
+            ):
+                process = NodeProcess(package, node, given, namespace=f'/{finger}', domain_id=DOMAIN)
+                nodes.append(stack.enter_context(process))
+            graph.listen(
+                _topic(finger, 'texture'),
+                lambda estimate, found=received[finger]: found.append((time.perf_counter(), estimate)),
+            )
+        plan.sort(key=lambda timed: timed[0])
+        publishers = {topic: graph.publisher(topic) for _, topic, _ in plan}
+        messages = [(due_ns, topic, to_msg(value)) for due_ns, topic, value in plan]
+
+        # Wait until each node subscribes to the streams, and each classifier is discovered.
+        needed = [_topic(finger, topic) for finger in fingers for topic in ('exploration', *feature_set.topics)]
+
+        def ready() -> bool:
+            heard = all(publishers[topic].get_subscription_count() for topic in needed)
+            return heard and all(graph.node.count_publishers(_topic(finger, 'texture')) for finger in fingers)
+
+        graph.wait_until(ready, READY_WITHIN_S * len(fingers), 'the feature extractors and classifiers')
+        graph.spin(SETTLE_S)
+
+        # Stream from a separate thread until each finger has its final estimate.
+        def publish() -> None:
+            start_s = time.perf_counter()
+            for due_ns, topic, message in messages:
+                ahead_s = due_ns * 1e-9 - (time.perf_counter() - start_s)
+                if ahead_s > 0:
+                    time.sleep(ahead_s)
+                sent_s[topic].append(time.perf_counter())
+                publishers[topic].publish(message)
+
+        def ended() -> bool:
+            return all(found and found[-1][1].final for found in received.values())
+
+        before_s, began_s = [node.cpu_s() for node in nodes], time.monotonic()
+        streamer = threading.Thread(target=publish, name='streamer')
+        streamer.start()
+        graph.wait_until(ended, slide_s + READY_WITHIN_S, 'the final estimates')
+        lasted_s = time.monotonic() - began_s
+        streamer.join()
+        cpu: Counter[str] = Counter()
+        for node, used_s in zip(nodes, before_s, strict=True):
+            cpu[node.name] += (node.cpu_s() - used_s) / lasted_s
+    latency_ms = 1000 * np.array(
+        [
+            at_s
+            - max(
+                sent_s[_topic(finger, topic)][_last_batch(batches[finger][topic], estimate, length_s)]
+                for topic in feature_set.topics
+            )
+            for finger in fingers
+            for at_s, estimate in received[finger]
+            if not estimate.final
+        ]
+    )
+    median, p99 = np.percentile(latency_ms, (50, 99)).tolist()
     return {
-        finger.namespace: LiveLatency(np.array(finger.latency_s(streamer, topics, windows.length_s)), expected, load)
-        for finger, load in zip(fingers, loads, strict=True)
+        'estimates': len(latency_ms),
+        'expected': len(fingers) * (math.floor((slide_s - length_s) / hop_s + 1e-6) + 1),
+        'median_ms': median,
+        'p99_ms': p99,
+        'longest_ms': float(latency_ms.max()),
+        'cpu_percent': {name: round(100 * load, 1) for name, load in [*cpu.items(), ('all', cpu.total())]},
     }
 
 
-def _wait_for_nodes(graph: Graph, streamer: Streamer, fingers: Sequence[_Finger], topics: Sequence[str]) -> None:
-    """Wait until each node subscribes to the streams, and each classifier is discovered."""
-    needed = [finger.topic(topic) for finger in fingers for topic in ('exploration', *topics)]
-
-    def ready() -> bool:
-        heard = all(streamer.publishers[topic].get_subscription_count() for topic in needed)
-        return heard and all(graph.node.count_publishers(finger.topic('texture')) for finger in fingers)
-
-    graph.wait_until(ready, READY_WITHIN_S * len(fingers), 'the feature extractors and classifiers')
-    graph.spin(SETTLE_S)
-
-
-def _stream(
-    graph: Graph, streamer: Streamer, fingers: Sequence[_Finger], deadline_s: float
-) -> list[Mapping[str, float]]:
-    """Stream until each finger has its final estimate; return the load of each of its nodes, 1 for one core."""
-    before, began_s = [finger.cpu_s() for finger in fingers], time.monotonic()
-    streamer.start()
-    graph.wait_until(lambda: all(finger.ended for finger in fingers), deadline_s, 'the final estimates')
-    lasted_s = time.monotonic() - began_s
-    streamer.join()
-    return [
-        {name: (used_s - start[name]) / lasted_s for name, used_s in finger.cpu_s().items()}
-        for finger, start in zip(fingers, before, strict=True)
-    ]
-
-
-@dataclass(eq=False)
-class _Finger:
-    """What is streamed to the nodes of one finger, and what comes from them."""
-
-    namespace: str
-    states: Sequence[ExplorationState]
-    batches: Mapping[str, Sequence[TactileSignal]]
-    nodes: list[NodeProcess] = field(default_factory=list)
-    received: list[tuple[float, TextureEstimate]] = field(default_factory=list)
-
-    @classmethod
-    def simulated(cls, namespace: str, slide: LiveSlide) -> _Finger:
-        """Return a finger that slides."""
-        states, signals = simulate_exploration(
-            load_scene(slide.scene), slide.surface, SPEED_M_S, FORCE_N, slide.slide_s,
-            start_ns=0, exploration_id='long', rng=np.random.default_rng(slide.seed),
-        )  # fmt: skip
-        batches = {}
-        for topic, [first, *others] in signals.items():  # one unbroken stream
-            samples = np.concatenate([first.samples, *(signal.samples for signal in others)])
-            places = np.arange(len(samples))
-            batches[topic] = list(slide_batches(first, samples, places, first.stamp_ns, batch_s=BATCH_S))
-        return cls(namespace, states, batches)
-
-    def topic(self, short: str) -> str:
-        """Return the name of a topic of this finger."""
-        return f'{self.namespace}/{short}' if self.namespace else short
-
-    def start(self, graph: Graph, stack: ExitStack, model_path: Path) -> None:
-        """Start the two nodes, and note each estimate."""
-        for package, node, given in (
-            ('texture_features', 'feature_extractor', {'recipe': str(model_path.with_suffix('.json'))}),
-            ('texture_estimation', 'classifier', {'model': str(model_path)}),
-        ):
-            process = NodeProcess(package, node, given, namespace=f'/{self.namespace}', domain_id=DOMAIN)
-            self.nodes.append(stack.enter_context(process))
-        graph.listen(self.topic('texture'), lambda estimate: self.received.append((time.perf_counter(), estimate)))
-
-    @property
-    def ended(self) -> bool:
-        """Whether the final estimate has come."""
-        return bool(self.received) and self.received[-1][1].final
-
-    def cpu_s(self) -> Mapping[str, float]:
-        """Return the computing time of each node so far."""
-        return {node.name: node.cpu_s() for node in self.nodes}
-
-    def plan(self) -> list[Timed]:
-        """Return what is published when: a state at its stamp, a batch at its end."""
-        plan: list[Timed] = [(state.stamp_ns, self.topic('exploration'), state) for state in self.states]
-        for topic, signals in self.batches.items():
-            plan += [(signal.end_ns, self.topic(topic), signal) for signal in signals]
-        return sorted(plan, key=lambda timed: timed[0])
-
-    def latency_s(self, streamer: Streamer, topics: Sequence[str], length_s: float) -> list[float]:
-        """Return the time of each estimate since the last batch of its newest window was published."""
-        sent = {topic: _sent_at(streamer, self.topic(topic)) for topic in topics}
-        return [
-            at_s - max(sent[topic][_last_batch(self.batches[topic], estimate, length_s)] for topic in sent)
-            for at_s, estimate in self.received
-            if not estimate.final
-        ]
+def _topic(finger: str, name: str) -> str:
+    return f'{finger}/{name}' if finger else name
 
 
 def driver_cpu() -> float:
@@ -288,10 +209,6 @@ def driver_cpu() -> float:
             before, began = sensor.cpu_s(), time.monotonic()
             graph.spin(DRIVER_S)
             return (sensor.cpu_s() - before) / (time.monotonic() - began)
-
-
-def _sent_at(streamer: Streamer, topic: str) -> list[float]:
-    return [at_s for at_s, name in zip(streamer.sent_at_s, streamer.topics, strict=True) if name == topic]
 
 
 def _last_batch(batches: Sequence[TactileSignal], estimate: TextureEstimate, length_s: float) -> int:

@@ -42,7 +42,7 @@ from texture_core.types import (
 )
 from texture_estimation.model import load_model
 from texture_estimation.next_motion import slide_values
-from texture_evaluation.check import adapt_to_today, check_finger, store_reference
+from texture_evaluation.check import check_finger, store_reference
 from texture_evaluation.collection import (
     CollectionEnd,
     CollectionParams,
@@ -206,7 +206,7 @@ def requests_of(options: argparse.Namespace) -> list[ExplorationRequest]:
     if options.preset:
         if options.repeats < 0:
             raise InvalidParameter(f'--repeats is {options.repeats}; 1 or more rounds are needed')
-        return [replace(one, surface=options.surface) for one in load_preset(options.preset).all(options.repeats)]
+        return [replace(one, surface=options.surface) for one in load_preset(options.preset, options.repeats)]
     find(MOTIONS, options.motion, 'motion')  # refused before the wait for an explorer
     numbers = {field: getattr(options, option) for option, field, _, _ in NUMBERS}
     x_m, y_m = options.start or (0.0, 0.0)
@@ -464,18 +464,11 @@ def _configure_check(parser: argparse.ArgumentParser) -> None:
     for option, (_, unit, meaning, usual) in PLATE_NUMBERS.items():
         shown = f'{meaning}, {unit}; default: that of the reference, or {usual:g}'
         parser.add_argument(f'--{option}', type=float, help=shown)
-    parser.add_argument(
-        '--today', nargs='+', metavar='BAG', help='bags of today with a labelled slide of each surface; needs --trained'
-    )
-    parser.add_argument('--trained', nargs='+', metavar='BAG', help='bags of several days on which it was trained')
     add_namespace(parser)
 
 
 def _check(options: argparse.Namespace) -> int:
-    """Check, store or adapt; return 1 if the finger is not as trained and was not corrected."""
-    if options.today or options.trained:
-        print(adapt_to_today(options.model, options.trained or (), options.today or ())[1])
-        return 0
+    """Check or store; return 1 if the finger is not as trained and was not corrected."""
     # Report what is missing before the robot moves.
     topics = load_model(options.model).recipe.feature_set.topics
     reference, made = ({}, {}) if options.store else read_reference(options.model)

@@ -146,31 +146,15 @@ def assign_folds(y: Codes, groups: Codes, count: int, parts: Codes | None = None
     note = f'held-out slides, {count} parts'
     for code in np.unique(y):
         rows = np.flatnonzero(y == code)
-        slides = _numbered(groups[rows])
-        if not slides.any():
+        order = {group: place for place, group in enumerate(dict.fromkeys(groups[rows].tolist()))}
+        slides = np.array([order[group] for group in groups[rows].tolist()])
+        if len(order) < 2:
             note = 'held-out windows, as a label has a single slide: too confident'
             slides = np.arange(len(rows))
         if len(rows) < 2:
             return None
         folds_of[rows] = slides * count // (slides.max() + 1)
     return folds_of, note
-
-
-def _numbered(groups: Codes) -> Codes:
-    """Return 0, 1, … for the groups in the order of their first appearance."""
-    _, first, inverse = np.unique(groups, return_index=True, return_inverse=True)
-    rank = np.empty(len(first), dtype=np.intp)
-    rank[np.argsort(first)] = np.arange(len(first))
-    return rank[inverse.reshape(-1)]
-
-
-def held_out_scores(fit: Callable[[NDArray[np.bool_]], Predictor], X: Array, folds_of: Codes, count: int) -> Array:
-    """Return the output for each example of a predictor that was not trained on its fold, (n, count)."""
-    found = np.empty((len(X), count))
-    for part in np.unique(folds_of):
-        held = folds_of == part
-        found[held] = fit(held)(X[held])
-    return found
 
 
 UNCALIBRATED = 'not calibrated, as a label has a single window'  # so nothing can be held out

@@ -284,11 +284,6 @@ class Mlp:
             'output_offset': output_offset,
         }
 
-    def _steps(self, n_examples: int, work: int, fraction: float) -> int:
-        """Return the number of batches, fewer where each costs much: with this many features and labels."""
-        passes, most = math.ceil(fraction * self.epochs), round(fraction * MAX_WORK / work)
-        return min(max(passes * -(-n_examples // BATCH), MIN_STEPS), max(most, MIN_STEPS))
-
     def _descend(
         self, drawn: AugmentedBatches | _Batches, shape: tuple[int, ...], n_labels: int, rng: np.random.Generator,
         fraction: float,
@@ -298,7 +293,9 @@ class Mlp:
         network = MlpTraining(n_features, self.hidden, n_labels, rng)
         # Noise is cut from a table at random places: a new number for each input took a fifth of the training.
         table = np.float32(self.noise) * rng.standard_normal(max(NOISE_TABLE, 4 * BATCH * n_features), dtype=np.float32)
-        steps = self._steps(n_examples, n_features + n_labels, fraction)
+        # Fewer steps where each costs much: with many features and labels.
+        passes, most = math.ceil(fraction * self.epochs), round(fraction * MAX_WORK / (n_features + n_labels))
+        steps = min(max(passes * -(-n_examples // BATCH), MIN_STEPS), max(most, MIN_STEPS))
         for step in range(steps):
             inputs, codes = drawn.draw(min(BATCH, n_examples))
             start = rng.integers(len(table) - inputs.size + 1)

@@ -9,13 +9,12 @@ import io
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.config import BROKEN_CONTENT, MB, Archive, library, parse_json, safe_repr, unknown_name
+from texture_core.config import MB, Archive, FileRefused, library, safe_repr, unknown_name
 from texture_core.errors import InvalidParameter, ModelMismatch
 from texture_core.types import Array
 from texture_estimation.learners.learner import (
@@ -24,7 +23,6 @@ from texture_estimation.learners.learner import (
     Fitted,
     assign_folds,
     fit_temperature,
-    held_out_scores,
     log_softmax,
     standardisation,
 )
@@ -33,18 +31,13 @@ from texture_estimation.learners.learner import (
 # Estimators of scikit-learn as bytes in a model file, by skops: read without running code.
 
 SKOPS = ('skops.io', 'learners of scikit-learn', 'models')
-SCHEMA = 'schema.json'
-MAX_SCHEMA_BYTES = 10 * MB  # a thousand trees; each node in it becomes objects of 2 kB
 MAX_PACKED_BYTES = 300 * MB  # to which the bytes may unpack
-NODES = (
-    'DictNode', 'ListNode', 'TupleNode', 'JsonNode', 'NdArrayNode', 'TypeNode', 'ObjectNode', 'TreeNode',
-    'RandomStateNode',
-)  # fmt: skip
-# What an estimator holds next to estimators, arrays and plain values; its trees are checked before they are used.
-ESTIMATOR_PARTS = (
+# What an estimator holds next to estimators, arrays and plain values. Trees are checked before they are used.
+PARTS = (
     'sklearn.calibration._CalibratedClassifier',
     'sklearn.neural_network._stochastic_optimizers.AdamOptimizer',
     'sklearn.neural_network._stochastic_optimizers.SGDOptimizer',
+    'sklearn.tree._tree.Tree',
 )
 
 
@@ -52,8 +45,8 @@ def packed(estimator: Any, name: str) -> NDArray[np.uint8]:
     """Return an estimator as bytes, (n,), for a model file."""
     content = library(*SKOPS).dumps(estimator)
     try:
-        _check_parts(content)
-    except (*BROKEN_CONTENT, ModelMismatch) as error:
+        _checked_types(content)
+    except (FileRefused, ModelMismatch) as error:
         raise InvalidParameter(
             f"'{name}' cannot be stored as a model: {error}; use another estimator or other parameters "
             '(neighbours with algorithm: brute, fewer trees)'
@@ -63,57 +56,27 @@ def packed(estimator: Any, name: str) -> NDArray[np.uint8]:
 
 def unpacked(content: NDArray[np.uint8]) -> Any:
     """Return what `packed` was given; nothing is built of types that no estimator holds, and no code is run."""
-    skops = library(*SKOPS)  # takes seconds, and few models need it
-    trusted = _check_parts(content.tobytes())
-    unexpected = sorted(set(skops.get_untrusted_types(data=content.tobytes())) - set(trusted))
-    if unexpected:
+    return library(*SKOPS).loads(content.tobytes(), trusted=_checked_types(content.tobytes()))
+
+
+def _checked_types(content: bytes) -> list[str]:
+    """Return the types that skops is to trust; raise FileRefused or ModelMismatch at others, and at too many bytes."""
+    with Archive(io.BytesIO(content), MAX_PACKED_BYTES):
+        types: list[str] = library(*SKOPS).get_untrusted_types(data=content)
+    if unexpected := [name for name in types if name not in PARTS and not _is_estimator(name)]:
         raise ModelMismatch(f'it holds {", ".join(unexpected)}, which no model of this suite holds')
-    return skops.loads(content.tobytes(), trusted=trusted)
+    return types
 
 
-def _check_parts(content: bytes) -> list[str]:
-    """Return the types in it; raise ModelMismatch or FileRefused unless skops, which counts nothing, may read it.
-
-    A member may be named by many nodes, each of which makes a separate array; and some kinds of node would read
-    archives within the archive, or call functions.
-    """
-    found = set()
-    with Archive(io.BytesIO(content), MAX_PACKED_BYTES) as file:
-        for node in _nodes(parse_json(file.read(SCHEMA, MAX_SCHEMA_BYTES).decode())):
-            kind, name = str(node['__loader__']), f'{node.get("__module__")}.{node.get("__class__")}'
-            if kind not in NODES or (kind == 'ObjectNode' and not _is_estimator(name)):
-                raise ModelMismatch(f'it holds {name} ({kind}), which no model of this suite holds')
-            if kind in ('ObjectNode', 'TreeNode'):
-                found.add(name)
-            if kind == 'NdArrayNode' and node.get('type') == 'numpy':
-                file.array(str(node['file']))
-    return sorted(found)
-
-
-@lru_cache(maxsize=1000)
 def _is_estimator(name: str) -> bool:
-    """Return whether a name is that of an estimator of scikit-learn, or of a part of one that holds plain values."""
-    if name in ESTIMATOR_PARTS:
-        return True
+    """Return whether a name is that of an estimator of scikit-learn; private ones are parts of public ones."""
     module, _, cls_name = name.rpartition('.')
     if not module.startswith('sklearn.'):
         return False
     from sklearn.base import BaseEstimator  # noqa: PLC0415  # takes a second
 
-    try:
-        cls = getattr(importlib.import_module(module), cls_name, None)
-    except ImportError:
-        return False
+    cls = getattr(importlib.import_module(module), cls_name, None)
     return isinstance(cls, type) and issubclass(cls, BaseEstimator)
-
-
-def _nodes(value: Any) -> Iterator[Mapping[str, Any]]:
-    """Yield the nodes of a schema."""
-    if isinstance(value, Mapping) and '__loader__' in value:
-        yield value
-    parts = value.values() if isinstance(value, Mapping) else value if isinstance(value, list) else ()
-    for part in parts:
-        yield from _nodes(part)
 
 
 # --------------------
@@ -131,12 +94,6 @@ class SklearnPredictor:
     scale: Array
     n_labels: int
     temperature: float = 1.0
-    floor: float = FLOOR
-
-    @classmethod
-    def of_packed(cls, packed: NDArray[np.uint8], **parameters: Any) -> SklearnPredictor:
-        """Return the predictor of an estimator as bytes, and of the other parameters as they are."""
-        return cls(unpacked(packed), **parameters)
 
     def __post_init__(self) -> None:
         for tree in _trees(self.estimator, 0):
@@ -150,11 +107,9 @@ class SklearnPredictor:
         return log_softmax(scores / self.temperature).reshape(*X.shape[:-1], self.n_labels)
 
     def _scores(self, rows: Array) -> Array:
-        if not self.floor:
-            return np.asarray(self.estimator.predict_log_proba(rows), dtype=np.float64)
         if hasattr(self.estimator, 'predict_proba'):
             probabilities = np.asarray(self.estimator.predict_proba(rows), dtype=np.float64)
-            return np.log((1.0 - self.floor) * probabilities + self.floor / self.n_labels)
+            return np.log((1.0 - FLOOR) * probabilities + FLOOR / self.n_labels)
         decisions = np.asarray(self.estimator.decision_function(rows), dtype=np.float64)
         return np.stack((-decisions, decisions), axis=-1) if decisions.ndim == 1 else decisions
 
@@ -274,13 +229,17 @@ class SklearnLearner:
         InvalidParameter
             If there is no such classifier or parameter.
         """
-        cls = _classifier(self.estimator)
+        from sklearn.base import BaseEstimator, is_classifier  # noqa: PLC0415  # takes a second to import
+
+        cls = _public_class(self.estimator)
         try:
             estimator = cls()
         except TypeError as error:
             raise InvalidParameter(
                 f"'{self.estimator}' needs other estimators as parameters ({error}); name one that works alone"
             ) from error
+        if not (isinstance(estimator, BaseEstimator) and is_classifier(estimator)):
+            raise InvalidParameter(f"'{self.estimator}' is not a classifier; name one such as {EXAMPLE}")
         known = estimator.get_params()
         for name, _ in self.parameters:
             if name not in known:
@@ -301,9 +260,11 @@ class SklearnLearner:
         parameters = {'packed': packed(fitted.estimator, self.estimator), 'mean': fitted.mean, 'scale': fitted.scale}
         split = assign_folds(y, groups, FOLDS, parts)
         if split is None:
-            note = UNCALIBRATED
-            return Fitted({**parameters, 'n_labels': n_labels, 'temperature': 1.0}, None, note)
-        held_out = held_out_scores(lambda held: self._fit(X[~held], y[~held], n_labels), X, split[0], n_labels)
+            return Fitted({**parameters, 'n_labels': n_labels, 'temperature': 1.0}, None, UNCALIBRATED)
+        held_out = np.empty((len(X), n_labels))
+        for part in np.unique(split[0]):
+            held = split[0] == part
+            held_out[held] = self._fit(X[~held], y[~held], n_labels)(X[held])
         temperature = fit_temperature(held_out, y)
         return Fitted(
             {**parameters, 'n_labels': n_labels, 'temperature': temperature},
@@ -315,7 +276,8 @@ class SklearnLearner:
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> SklearnPredictor:
         """Return the predictor made from the stored parameters."""
-        return SklearnPredictor.of_packed(**parameters)
+        values = dict(parameters)
+        return SklearnPredictor(unpacked(values.pop('packed')), **values)
 
     def _fit(self, X: Array, y: Codes, n_labels: int) -> SklearnPredictor:
         mean, scale = standardisation(X)
@@ -326,10 +288,7 @@ class SklearnLearner:
         return SklearnPredictor(estimator, mean, scale, n_labels)
 
 
-def _classifier(name: str) -> Any:
-    """Return a public class of scikit-learn that classifies."""
-    from sklearn.base import BaseEstimator, is_classifier  # noqa: PLC0415  # takes a second to import
-
+def _public_class(name: str) -> Any:
     if not PUBLIC_CLASS.fullmatch(name):
         raise InvalidParameter(
             f'estimator is {safe_repr(name)}; a public class of scikit-learn such as {EXAMPLE} is needed; '
@@ -337,21 +296,11 @@ def _classifier(name: str) -> Any:
         )
     module, cls_name = name.split(':')
     try:
-        cls = getattr(importlib.import_module(module), cls_name)
+        return getattr(importlib.import_module(module), cls_name)
     except (ImportError, AttributeError) as error:
         raise InvalidParameter(
             f"there is no '{cls_name}' in '{module}'; name a classifier such as {EXAMPLE}"
         ) from error
-    if not (isinstance(cls, type) and issubclass(cls, BaseEstimator) and _classifies(cls, is_classifier)):
-        raise InvalidParameter(f"'{name}' is not a classifier; name one such as {EXAMPLE}")
-    return cls
-
-
-def _classifies(cls: Any, is_classifier: Any) -> bool:
-    try:
-        return bool(is_classifier(cls()))
-    except TypeError:  # it needs other estimators; the caller reports it
-        return hasattr(cls, 'predict')
 
 
 def _plain(name: str, value: Any) -> Any:

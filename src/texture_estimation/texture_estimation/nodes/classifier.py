@@ -82,30 +82,25 @@ class EstimatorNode(Node):
         """Return how many vectors could not be used, by reason."""
         raise NotImplementedError
 
-    def _vector_of(self, message: msg.FeatureVector) -> FeatureVector | None:
+    def _on_features(self, message: msg.FeatureVector) -> None:
+        began = time.perf_counter()
+        # Vectors that did not come: their numbers run on, and start again with another extractor.
+        number, expected = message.sequence, self._next_number
+        if expected is not None:
+            self._lost += number - (expected if number >= expected else 0)
+        self._next_number = number + 1
         try:
-            return from_msg(message)
+            vector = from_msg(message)
         except TextureError as error:
             self._invalid += 1
             self.get_logger().warning(str(error), throttle_duration_sec=1.0)
-            return None
-
-    def _on_features(self, message: msg.FeatureVector) -> None:
-        began = time.perf_counter()
-        self._count_lost(message.sequence)
-        vector = self._vector_of(message)
-        estimate = self._predict(vector) if vector is not None else None
+            return
+        estimate = self._predict(vector)
         if estimate is None:
             return
         self._processing_s = time.perf_counter() - began
         self._publisher.publish(to_msg(dataclasses.replace(estimate, processing_s=self._processing_s)))
         self._estimates += 1
-
-    def _count_lost(self, number: int) -> None:
-        """Count the vectors that did not come: their numbers run on, and start again with another extractor."""
-        if self._next_number is not None:
-            self._lost += number - (self._next_number if number >= self._next_number else 0)
-        self._next_number = number + 1
 
     def _change(self, params: EstimatorParams) -> None:
         try:

@@ -25,7 +25,7 @@ from urllib.parse import quote
 import numpy as np
 
 from texture_core.config import param
-from texture_core.errors import DeviceError
+from texture_core.errors import CommandRefused, DeviceError
 from texture_core.types import Array, rotation_matrix
 from texture_exploration.force_control import ContactState, ForceLoop, ForceLoopParams
 
@@ -268,6 +268,16 @@ class SurfaceArm(Arm):
         self._params = self._params.at_surface(pose)
         self._frame = SurfaceFrame(self._params.surface_pose)
 
+    def _check(self, command: ArmCommand) -> None:
+        """Refuse a command that is out of range, or has a force before the force sensor is zeroed; the arm stops."""
+        self._params.check(command, self.stop)
+        if command.force_n is not None and not self.zeroed and not self.state().fault:
+            self.stop()
+            raise CommandRefused(
+                'the command was refused and the arm stopped: a force is wanted, and the force sensor is not zeroed; '
+                f'rise by {1e3 * ZERO_RISE_M:g} mm in free air and rest, until the arm is zeroed'
+            )
+
 
 # --------------------
 # Tangential force of a sliding finger, from the force vector of a wrist sensor.
@@ -380,11 +390,6 @@ class GuardProcess:
                 start_new_session=True,
             )
 
-    @property
-    def pid(self) -> int:
-        """Of the process."""
-        return self._process.pid
-
     def dismiss(self) -> None:
         """End the guard: the robot is at rest or released, or the connection is lost."""
         with contextlib.suppress(OSError, subprocess.TimeoutExpired):  # of a guard that has ended
@@ -410,11 +415,6 @@ GUARD_NICENESS = -10  # before other load of the machine
 # --------------------
 # Detect free air from the force while the finger rises.
 
-UNSTEADY = (
-    'its force sensor could not be zeroed: the force changed while the finger rose; check that nothing touches '
-    "the finger, and raise 'zero_steady_n' above the noise of the sensor"
-)
-
 
 @dataclass(frozen=True)
 class ZeroingParams:
@@ -431,8 +431,6 @@ class ZeroingParams:
 
 ZERO_RISE_M = 0.003  # through which a constant force proves free air; it notices contacts of zero_steady_n / 3 mm
 SMOOTHING_S = 0.02  # time constant over which the force is averaged: noise is no contact
-RISE_M_S = 0.02  # of an arm that looks for free air before it presses, as its force sensor is not zeroed
-MAX_RISES = 5.0  # highest rise, as a multiple of the rise that proves free air
 
 
 class FreeAir:
@@ -450,7 +448,6 @@ class FreeAir:
         self._time_ns = 0
         self._start: Vector | None = None  # from where the rise counts
         self._start_n = math.nan
-        self._sought_from_m: float | None = None
         self.proven = False
 
     def presume_contact(self) -> None:
@@ -469,15 +466,6 @@ class FreeAir:
         elif not self.proven:
             self._rise(start, position)
         return self.proven
-
-    def seek(self, height_m: float | None) -> bool:
-        """Return whether the rise in search of free air takes too long; None without a search."""
-        if height_m is None:
-            self._sought_from_m = None
-            return False
-        if self._sought_from_m is None:
-            self._sought_from_m = height_m
-        return height_m - self._sought_from_m > MAX_RISES * self._rise_m
 
     def _smooth(self, time_ns: int, force_n: float) -> None:
         passed_s, self._time_ns = (time_ns - self._time_ns) * 1e-9, time_ns

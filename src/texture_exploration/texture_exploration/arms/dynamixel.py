@@ -23,6 +23,10 @@ import serial
 from texture_core.errors import CommandRefused, DeviceError
 from texture_exploration.arms.arm import DONE, STANDSTILL, ArmCommand, GuardProcess, guard_socket
 from texture_exploration.arms.hand import (
+    POSITION_RAD,
+    VELOCITY_RAD_S,
+    X_SERIES,
+    ZERO,
     FingerSet,
     Fingertip,
     HandState,
@@ -51,6 +55,7 @@ WAIT_S = 0.001
 PACKET_ID, PACKET_LENGTH, PACKET_PARAMETERS = 4, 5, 9
 NO_PARAMETERS = 4  # length of a status packet without parameters
 SYNC_WRITE, BROADCAST = 0x83, 0xFE  # instruction, and the id of all motors
+OPERATING_MODE = 5  # current-based position: in any other the current does not bound the force
 FIRMWARE = 6  # address of its version, of one byte, in all control tables of protocol 2.0
 TRIPPED = 0xFF  # the register of the Bus Watchdog after it has stopped the motor
 RESTART_S = 3.0  # a motor has rebooted within
@@ -67,10 +72,6 @@ class MotorState(NamedTuple):
     current_a: float
     velocity_rad_s: float
     position_rad: float
-
-
-class NoAnswer(DeviceError):
-    """A motor that did not answer a write."""
 
 
 def _locked(device: str) -> int:
@@ -119,9 +120,9 @@ class DynamixelBus:
         if not opened:
             raise DeviceError(f"device '{device}' refuses {profile.baud} baud; correct the profile '{profile.name}'")
         self._port.ser.timeout = WAIT_S
-        first, last = profile.table['present_current'], profile.table['present_position']
+        first, last = X_SERIES['present_current'], X_SERIES['present_position']
         self._block = (first[0], last[0] + last[1] - first[0])
-        first, last = profile.table['torque_enable'], profile.table['goal_current']
+        first, last = X_SERIES['torque_enable'], X_SERIES['goal_current']
         self._health = (first[0], last[0] + last[1] - first[0])
         self._turn = 0
         self._garbled = False  # the last answer
@@ -144,23 +145,16 @@ class DynamixelBus:
                 f"no motor answers on '{self._device}' at {self._profile.baud} baud; check power, baud rate and the "
                 f"ids of the profile '{self._profile.name}'"
             )
-        if errors := [error for motor in found if (error := self.hardware_error(motor))]:
-            raise DeviceError('; '.join(errors))
+        errors = {motor: bits for motor in found if (bits := self.read_register(motor, 'hardware_error'))}
+        if errors:
+            raise DeviceError('; '.join(self._reported(motor, bits) for motor, bits in errors.items()))
         for motor in found:
-            self._energise(motor)
-
-    def look_for(self, motor: int) -> bool:
-        """Add a motor if it answers without an error; return whether it was added."""
-        try:
-            if not self._prepare(motor):
-                return False
-            if error := self.hardware_error(motor):
-                self._reasons[motor] = error
-                return False
-            self._energise(motor)
-        except NoAnswer:  # a loose contact: no reason to release the others
-            return False
-        return True
+            # Its watchdog first: once its torque is on, it holds its position.
+            if self._profile.watchdog:
+                self._arm(motor, 'bus_watchdog', self._profile.watchdog)
+            self.write(motor, 'torque_enable', 1)
+            self._energised.add(motor)
+            self.missing.discard(motor)
 
     def why_missing(self, motor: int) -> str:
         """Return why a motor is missing, as text."""
@@ -169,7 +163,6 @@ class DynamixelBus:
     def _prepare(self, motor: int) -> bool:
         """Set mode, limits and goals of a motor without torque; return whether it answers."""
         profile = self._profile
-        self._reasons.pop(motor, None)
         model, result = self._ping(motor)
         self._garbled = result == self._sdk.COMM_RX_CORRUPT
         position = self.read_register(motor, 'present_position') if result == SUCCESS else None
@@ -190,7 +183,7 @@ class DynamixelBus:
         self.write(motor, 'torque_enable', 0)  # or the mode cannot be set
         if self.read_register(motor, 'bus_watchdog'):  # old firmware has none and refuses to write it
             self.write(motor, 'bus_watchdog', 0)  # or no goal is taken after it has stopped the motor
-        self._arm(motor, 'operating_mode', profile.operating_mode)
+        self._arm(motor, 'operating_mode', OPERATING_MODE)
         for register, value in profile.gains.items():
             self.write(motor, register, value)
         with self._line():
@@ -211,20 +204,12 @@ class DynamixelBus:
         self.write(motor, 'goal_position', position)
         return True
 
-    def _energise(self, motor: int) -> None:
-        """Arm the motor's watchdog, then switch its torque on: it holds its position."""
-        if self._profile.watchdog:
-            self._arm(motor, 'bus_watchdog', self._profile.watchdog)
-        self.write(motor, 'torque_enable', 1)
-        self._energised.add(motor)
-        self.missing.discard(motor)
-
     def _arm(self, motor: int, register: str, value: int) -> None:
         """Write a register that bounds the force, and read it back: a motor may confirm a value without storing it."""
         self.write(motor, register, value)
         kept = self.read_register(motor, register)
         if kept is None:
-            raise NoAnswer(f"{self._profile.owner(motor)} did not report '{register}': it {SILENT}")
+            raise DeviceError(f"{self._profile.owner(motor)} did not report '{register}': it {SILENT}")
         if kept != value:
             raise DeviceError(
                 f"{self._profile.owner(motor)} was given {value} for '{register}' and holds {kept}: what bounds its "
@@ -274,13 +259,10 @@ class DynamixelBus:
     def write_goals(self, goals: Mapping[int, tuple[float, float]]) -> None:
         """Send highest current (A; no more than the motor's limit) and position (rad) of motors."""
         present = {motor: goal for motor, goal in goals.items() if motor not in self.missing}
-        profile = self._profile
         currents = {motor: self._counts(motor, current_a) for motor, (current_a, _) in present.items()}
         self._goal_currents.update(currents)
         self._sync_write('goal_current', currents)
-        self._sync_write(
-            'goal_position', {m: round(p / profile.position_rad) + profile.zero for m, (_, p) in present.items()}
-        )
+        self._sync_write('goal_position', {m: round(p / POSITION_RAD) + ZERO for m, (_, p) in present.items()})
 
     def torque_off(self, motors: Iterable[int]) -> None:
         """Release motors, also those that do not answer: they may still receive."""
@@ -289,7 +271,7 @@ class DynamixelBus:
 
     def torque_off_packet(self) -> bytes:
         """Return the instruction packet (sync write, protocol 2.0) that releases all motors without the SDK."""
-        address, _ = self._profile.table['torque_enable']
+        address, _ = X_SERIES['torque_enable']
         params = address.to_bytes(2, 'little') + b'\x01\x00' + b''.join(bytes([m, 0]) for m in self._profile.ids)
         body = bytes([SYNC_WRITE]) + params
         packet = b'\xff\xff\xfd\x00' + bytes([BROADCAST]) + (len(body) + 2).to_bytes(2, 'little') + body
@@ -317,13 +299,13 @@ class DynamixelBus:
             return ''  # silence is detected elsewhere
 
         def value(register: str) -> int:
-            address, size = self._profile.table[register]
+            address, size = X_SERIES[register]
             at = address - self._health[0]
             return int.from_bytes(data[at : at + size], 'little')
 
         owner, watchdog = self._profile.owner(motor), self._profile.watchdog
         if bits := value('hardware_error'):
-            return f'{owner} reports {_reasons(bits)}{REMEDY}'
+            return self._reported(motor, bits)
         if motor not in self._energised:
             return ''
         if value('bus_watchdog') == TRIPPED:
@@ -340,10 +322,9 @@ class DynamixelBus:
             self.write(motor, 'goal_current', self._goal_currents[motor])
         return ''
 
-    def hardware_error(self, motor: int) -> str:
-        """Return the hardware error of a motor and the remedy as text, '' if there is none."""
-        bits = self.read_register(motor, 'hardware_error')
-        return f'{self._profile.owner(motor)} reports {_reasons(bits)}{REMEDY}' if bits else ''
+    def _reported(self, motor: int, bits: int) -> str:
+        """Return the hardware error of a motor and the remedy as text."""
+        return f'{self._profile.owner(motor)} reports {_reasons(bits)}{REMEDY}'
 
     def _counts(self, motor: int, current_a: float) -> int:
         """Return a current in counts, limited to the range of the motor, which would refuse the whole command."""
@@ -352,7 +333,7 @@ class DynamixelBus:
 
     def write(self, motor: int, register: str, value: int) -> None:
         """Write one register, and check that it was accepted."""
-        address, size = self._profile.table[register]
+        address, size = X_SERIES[register]
         send = {1: 'write1ByteTxRx', 2: 'write2ByteTxRx', 4: 'write4ByteTxRx'}[size]
         for _ in range(TRIES):
             with self._line():
@@ -361,7 +342,7 @@ class DynamixelBus:
                 break
         if result != SUCCESS:
             why = self._packets.getTxRxResult(result)
-            raise NoAnswer(f"{self._profile.owner(motor)} did not accept '{register}': {why}")
+            raise DeviceError(f"{self._profile.owner(motor)} did not accept '{register}': {why}")
         # The highest bit only reports that there is a hardware error, which is read separately.
         if error & 0x7F:
             why = self._packets.getRxPacketError(error & 0x7F)
@@ -369,7 +350,7 @@ class DynamixelBus:
 
     def read_register(self, motor: int, register: str) -> int | None:
         """Return one register, signed if it is longer than a byte; None if the motor does not answer."""
-        address, size = self._profile.table[register]
+        address, size = X_SERIES[register]
         for _ in range(TRIES):
             data, result = self._read_block(motor, address, size)
             self._garbled = result == self._sdk.COMM_RX_CORRUPT
@@ -414,18 +395,18 @@ class DynamixelBus:
         profile = self._profile
 
         def value(register: str) -> int:
-            address, size = profile.table[register]
+            address, size = X_SERIES[register]
             at = address - self._block[0]
             return int.from_bytes(data[at : at + size], 'little', signed=True)
 
         return MotorState(
             current_a=value('present_current') * profile.current_a,
-            velocity_rad_s=value('present_velocity') * profile.velocity_rad_s,
-            position_rad=(value('present_position') - profile.zero) * profile.position_rad,
+            velocity_rad_s=value('present_velocity') * VELOCITY_RAD_S,
+            position_rad=(value('present_position') - ZERO) * POSITION_RAD,
         )
 
     def _sync_write(self, register: str, values: Mapping[int, int]) -> None:
-        address, size = self._profile.table[register]
+        address, size = X_SERIES[register]
         group = self._sdk.GroupSyncWrite(self._port, self._packets, address, size)
         for motor, value in values.items():
             group.addParam(motor, list((value % (1 << 8 * size)).to_bytes(size, 'little')))
@@ -494,7 +475,6 @@ COMMAND_S = 0.2  # time for which a command holds
 CLOSING_M_S = 0.02  # speed of a finger that comes down to press
 REACH_RAD = 0.3  # largest depth of the goal of a pressing motor within the object
 SLACK_RAD = 0.2  # largest distance between the goal and a blocked motor
-SEARCH_S = 2.0  # period of the search for one missing motor, which costs 34 ms
 LONGEST_STEP_S = 0.05
 RATE_CYCLES = 40  # over which the rate is measured
 SLOW_FRACTION = 0.7  # of the rate of the profile, below which a warning is given
@@ -506,18 +486,16 @@ NOT_CONNECTED = 'the hand is not connected; connect it first'
 class DynamixelHand:
     """See `texture_exploration.arms.hand.Hand`. One thread owns the bus.
 
-    A motor that is missing or reports an error is named in the fault of the state; the others go on. However the thread
-    or the process ends, the torque is switched off: by the thread itself, by a `TorqueGuard` when the process is gone;
-    and without a message for the time in the profile, the Bus Watchdog of the motors stops them.
+    A motor that is missing or reports an error is named in the fault of the state until the hand is connected again;
+    the others go on. However the thread or the process ends, the torque is switched off: by the thread itself, by a
+    `TorqueGuard` when the process is gone; and without a message for the time in the profile, the Bus Watchdog of the
+    motors stops them.
     """
 
-    def __init__(
-        self, profile: str, device: str, torque_off_on_fault: bool = False, limits: CommandLimits = LIMITS
-    ) -> None:
+    def __init__(self, profile: str, device: str, limits: CommandLimits = LIMITS) -> None:
         self.profile: Profile = load_profile(profile)
         self.finger_sets: Mapping[str, FingerSet] = self.profile.finger_sets
         self._device = device
-        self._torque_off = torque_off_on_fault
         self._limits = limits
         self._fingers = {name: DynamixelFinger(joints, self.profile) for name, joints in self.profile.fingers.items()}
         self._state: HandState | None = None
@@ -637,31 +615,22 @@ class DynamixelHand:
         period_s = 1.0 / self.profile.rate_hz
         for finger in self._fingers.values():
             finger.restart()
-        now_s = stepped_s = searched_s = time.monotonic()
+        now_s = stepped_s = time.monotonic()
         errors: dict[str, None] = {}
         cycles: deque[float] = deque(maxlen=RATE_CYCLES)
-        let_go = ''
         while not self._closing.wait(max(0.0, now_s + period_s - time.monotonic())):
             now_s = time.monotonic()
-            if bus.missing and not let_go and now_s - searched_s > SEARCH_S:
-                searched_s = now_s
-                bus.look_for(min(bus.missing))
             motors = bus.read()
             if not motors:
                 if bus.missing and self._fresh.is_set():
-                    self._publish(let_go or self._fault(bus, errors))  # at once: before the others have been read again
+                    self._publish(self._fault(bus, errors))  # at once: before the others have been read again
                 continue
             if error := bus.check_next():
                 errors[error] = None
-            fault = let_go or self._fault(bus, errors)
             goals = self._step(motors, min(LONGEST_STEP_S, now_s - stepped_s), now_s)
             stepped_s = now_s
-            self._publish(fault)
-            if fault and self._torque_off:
-                let_go = fault  # stays: motors without torque follow nothing, even when the missing one is back
-                bus.torque_off(self.profile.ids)
-            else:
-                bus.write_goals(goals)
+            self._publish(self._fault(bus, errors))
+            bus.write_goals(goals)
             cycles.append(now_s)
             self._warning = self._slowness(cycles)
 
@@ -730,12 +699,10 @@ class DynamixelFinger:
         self._pressing = False
 
     def measure(self, motors: Mapping[int, MotorState]) -> None:
-        """Take the measurements of the motors; a missing one keeps its last, and resumes at its position."""
+        """Take the measurements of the motors; a missing one keeps its last."""
         for role, joint in self._joints.items():
             motor = motors.get(joint.id)
-            if motor is None:
-                self._goal.pop(role, None)  # outdated goal, to which it would jump
-            else:
+            if motor is not None:
                 self._motors[role] = motor
                 self._start.setdefault(role, motor.position_rad)
                 self._goal.setdefault(role, motor.position_rad)

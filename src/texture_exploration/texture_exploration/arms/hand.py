@@ -43,13 +43,16 @@ MODELS: Mapping[int, MotorModel] = {
     1230: MotorModel('XC330-M181', 0.001, 0.60 / 1.80),
     1240: MotorModel('XC330-M288', 0.001, 0.93 / 1.80),
 }
-# Address and bytes of the registers in all models above. Source: the same, section Control Table.
+# Of all models above: address and bytes of the registers, and the scales of position and velocity. Source: the same,
+# section Control Table.
 X_SERIES: Mapping[str, tuple[int, int]] = {
     'operating_mode': (11, 1), 'current_limit': (38, 2), 'torque_enable': (64, 1), 'hardware_error': (70, 1),
     'position_d': (80, 2), 'position_i': (82, 2), 'position_p': (84, 2), 'bus_watchdog': (98, 1),
     'goal_current': (102, 2), 'goal_position': (116, 4), 'present_current': (126, 2), 'present_velocity': (128, 4),
     'present_position': (132, 4),
 }  # fmt: skip
+POSITION_RAD, ZERO = 0.001533981, 2048  # per count, and the counts of the middle position
+VELOCITY_RAD_S = 0.0239691  # per count
 TOLERANCE = 0.2  # of the torque of a count: motors of one model differ by less, and friction hides the rest
 
 SIZE_330 = range(1190, 1250)
@@ -67,20 +70,6 @@ def goes_on(model: int, firmware: int) -> bool:
 def describe(model: int) -> str:
     """Return a model number with the model's name, if it is in the table."""
     return f'{model} ({MODELS[model].name})' if model in MODELS else str(model)
-
-
-def differs(model: int, current_a: float, torque_nm_a: float) -> str:
-    """Return how a model's torque per count departs from that of given scales, '' if it does not, or is unknown."""
-    if model not in MODELS:
-        return ''
-    scale = MODELS[model]
-    count_nm = scale.current_a * scale.torque_nm_a
-    if abs(current_a * torque_nm_a / count_nm - 1) <= TOLERANCE:
-        return ''
-    return (
-        f'model {describe(model)} makes {scale.torque_nm_a:.2f} N·m/A at {scale.current_a * 1000:g} mA per count, and '
-        f'the profile says {torque_nm_a:g} N·m/A at {current_a * 1000:g} mA per count'
-    )
 
 
 # --------------------
@@ -138,31 +127,23 @@ class Hand(Protocol):
 
 
 # --------------------
-# A profile: motors, control table, scales and fingers of a Dynamixel hand, from one YAML file (config/hands).
+# A profile: motors, torque and fingers of a Dynamixel hand, from one YAML file (config/hands).
 
 ROLES = ('press', 'across', 'along')
 WATCHDOG_UNIT_S, MAX_WATCHDOG = 0.02, 127  # the register counts by these
 # Lowest and highest of every number: the range of these motors, with a margin. A number beyond is a typing error,
 # and the motors would press with it.
 RANGES: Mapping[str, tuple[float, float]] = {
-    'model': (0, 65535),
     'baud': (9600, 4_500_000),
     'rate_hz': (1.0, 1000.0),
-    'operating_mode': (5, 5),  # current-based position: in any other the current does not bound the force
     'gain': (0, 16383),
-    'position_rad': (1e-5, 0.1),
-    'zero': (-1_048_575, 1_048_575),
-    'velocity_rad_s': (1e-5, 1.0),
-    'current_a': (1e-5, 0.1),
     'torque_nm_a': (0.01, 100.0),
     'idle_a': (0.0, 0.5),
     'move_a': (0.001, 5.0),
     'lever_m': (0.001, 0.3),  # of either sign; no finger is longer
     'start_height_m': (0.0, 1.0),
     'id': (0, 252),
-    'address': (0, 2047),
 }
-SIZES = (1, 2, 4)  # bytes of a register
 
 
 class Joint(NamedTuple):
@@ -174,7 +155,7 @@ class Joint(NamedTuple):
 
 @dataclass(frozen=True)
 class Profile:
-    """Content of a profile file; registers are (address, bytes).
+    """Content of a profile file.
 
     `watchdog_s` is how long the motors continue without a message; 0: without limit.
     """
@@ -183,16 +164,10 @@ class Profile:
     models: tuple[int, ...]
     baud: int
     rate_hz: float
-    operating_mode: int
     gains: Mapping[str, int]
-    position_rad: float
-    zero: int
-    velocity_rad_s: float
-    current_a: float
     torque_nm_a: float
     idle_a: float
     move_a: float
-    table: Mapping[str, tuple[int, int]]
     fingers: Mapping[str, Mapping[str, Joint]]
     finger_sets: Mapping[str, FingerSet]
     start_height_m: float
@@ -204,6 +179,11 @@ class Profile:
         """All motors."""
         moving = [joint.id for finger in self.fingers.values() for joint in finger.values()]
         return tuple(sorted((*moving, *self.hold_pose)))
+
+    @property
+    def current_a(self) -> float:
+        """Current per count."""
+        return MODELS[self.models[0]].current_a
 
     @property
     def watchdog(self) -> int:
@@ -236,29 +216,25 @@ def load_profile(name_or_path: str) -> Profile:
 def read_profile(content: Mapping[str, Any], name: str) -> Profile:
     """Return the profile in the content of a file; raises as `load_profile`."""
     where = f"hand profile '{name}'"
-    missing = [register for register in X_SERIES if register not in content['table']]
-    if missing:
-        raise InvalidParameter(f'{where}: the table lacks {", ".join(missing)}')
     fingers = {finger: _joints(roles, f'{where}, {finger}') for finger, roles in content['fingers'].items()}
     sets = {key: FingerSet(tuple(one['hold']), tuple(one['slide'])) for key, one in content['finger_sets'].items()}
     for one in sets.values():
         for finger in (*one.hold, *one.slide):
             if finger not in fingers:
                 raise InvalidParameter(f'{where}: {unknown_name(finger, fingers, "finger")}')
-    given, kinds = {**content, **content['scales']}, get_type_hints(Profile)
+    kinds = get_type_hints(Profile)
     profile = Profile(
         name=name,
         models=tuple(content['models']),
         gains={register: int(value) for register, value in content['gains'].items()},
-        table={register: (int(place[0]), int(place[1])) for register, place in content['table'].items()},
         fingers=fingers,
         finger_sets=sets,
         hold_pose=tuple(content.get('hold_pose', ())),
         watchdog_s=float(content.get('watchdog_s', Profile.watchdog_s)),
-        **{number: kind(given[number]) for number, kind in kinds.items() if number in RANGES},
+        **{number: kind(content[number]) for number, kind in kinds.items() if number in RANGES},
     )
-    _check_numbers(profile, where)
     _check_models(profile, where)
+    _check_numbers(profile, where)
     if profile.watchdog_s != 0 and not 1 <= profile.watchdog_s / WATCHDOG_UNIT_S <= MAX_WATCHDOG:
         raise InvalidParameter(
             f'{where}: watchdog_s is {profile.watchdog_s:g} s; allowed are {WATCHDOG_UNIT_S:g} to '
@@ -272,30 +248,28 @@ def read_profile(content: Mapping[str, Any], name: str) -> Profile:
 def _check_numbers(profile: Profile, where: str) -> None:
     joints = [joint for finger in profile.fingers.values() for joint in finger.values()]
     numbers = [(name, getattr(profile, name)) for name in RANGES if hasattr(profile, name)]
-    numbers += [('model', model) for model in profile.models] + [('gain', gain) for gain in profile.gains.values()]
+    numbers += [('gain', gain) for gain in profile.gains.values()]
     numbers += [('id', motor) for motor in profile.ids] + [('lever_m', abs(joint.lever_m)) for joint in joints]
-    numbers += [('address', address) for address, _ in profile.table.values()]
     for name, number in numbers:
         low, high = RANGES[name]
         if not low <= number <= high:  # so is NaN
             raise InvalidParameter(f'{where}: {name} is {number:g}; allowed are {low:g} to {high:g}')
-    for register, (_, size) in profile.table.items():
-        if size not in SIZES:
-            raise InvalidParameter(f"{where}: register '{register}' has {size} bytes; 1, 2 or 4 are possible")
 
 
 def _check_models(profile: Profile, where: str) -> None:
     """Refuse motors for which the torque of the profile is wrong: they would press harder or softer than requested."""
+    if not profile.models or any(model not in MODELS for model in profile.models):
+        raise InvalidParameter(
+            f'{where}: models is {list(profile.models)}; known are {", ".join(map(describe, MODELS))}, and another '
+            'model has other registers and another torque'
+        )
     for model in profile.models:
-        for register, place in profile.table.items():
-            if model in MODELS and place != X_SERIES.get(register, place):
-                raise InvalidParameter(
-                    f"{where}: '{register}' is at {list(place)} in the table; motors of model {describe(model)} "
-                    f'have it at {list(X_SERIES[register])}, and the protection would not be armed'
-                )
-        if difference := differs(model, profile.current_a, profile.torque_nm_a):
+        scale = MODELS[model]
+        if abs(profile.current_a * profile.torque_nm_a / (scale.current_a * scale.torque_nm_a) - 1) > TOLERANCE:
             raise InvalidParameter(
-                f'{where}: {difference}; give each model a separate profile, with its current_a and torque_nm_a'
+                f'{where}: model {describe(model)} makes {scale.torque_nm_a:.2f} N·m/A at '
+                f'{scale.current_a * 1000:g} mA per count, and the profile says {profile.torque_nm_a:g} N·m/A at '
+                f'{profile.current_a * 1000:g} mA per count; give each model a separate profile, with its torque_nm_a'
             )
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from texture_core.config import find, param
 from texture_core.errors import DeviceError
-from texture_core.types import DEVICES, FingerSender, FingerState
+from texture_core.types import DEVICES
 from texture_exploration.arms.arm import Arm, ArmCommand, ArmState, Vector
 from texture_exploration.arms.dynamixel import DynamixelHand
 from texture_exploration.arms.hand import FingerSet, Fingertip, Hand, SimulatedHand
@@ -33,15 +33,11 @@ class InHandParams(CommandLimits):
     )
     profile: str = param('leap', 'Profile of a Dynamixel hand: the name of a shipped one or the path of a file.')
     device: str = param(f'{DEVICES}/dynamixel', 'Path of the serial device of a Dynamixel hand.')
-    torque_off_on_fault: bool = param(
-        False, 'Switches the torque off, which releases the object, when a motor of a Dynamixel hand reports a fault.'
-    )
-    finger_pipe: str = param('', "Named pipe for the finger position that the emulator reads; '' for none.")
 
 
 HANDS: Mapping[str, Callable[[InHandParams], Hand]] = {
     'simulated': lambda params: SimulatedHand(limits=params),
-    'dynamixel': lambda params: DynamixelHand(params.profile, params.device, params.torque_off_on_fault, params),
+    'dynamixel': lambda params: DynamixelHand(params.profile, params.device, params),
 }
 
 
@@ -59,7 +55,6 @@ class InHandArm(Arm):
         self._params = params
         self.hand = hand or HANDS[params.hand](params)
         self.fingers: FingerSet = find(self.hand.finger_sets, params.finger_set, 'finger set')
-        self._emulator = FingerSender(params.finger_pipe)
         self._connected = False
 
     def connect(self) -> None:
@@ -77,7 +72,6 @@ class InHandArm(Arm):
         """Release the object."""
         self._connected = False
         self.hand.close()
-        self._emulator.close()
 
     def state(self) -> ArmState:
         """Return the mean of the sliding fingers.
@@ -92,15 +86,13 @@ class InHandArm(Arm):
         hand = self.hand.state()
         tips = [hand.fingers[name] for name in self.fingers.slide]
         weak = self._weak(LOST_FRACTION)
-        state = ArmState(
+        return ArmState(
             time_ns=hand.time_ns,
             position=_mean([tip.position for tip in tips]),
             velocity=_mean([tip.velocity for tip in tips]),
             force_n=sum(tip.force_n for tip in tips) / len(tips),
             fault=hand.fault or (f'the grip is lost: {weak}' if weak else ''),
         )
-        self._emulator.send(FingerState(state.time_ns, *state.position, *state.velocity, state.force_n))
-        return state
 
     def command(self, command: ArmCommand) -> None:
         """Let the sliding fingers follow.
@@ -114,7 +106,6 @@ class InHandArm(Arm):
         """
         if not self._connected:
             raise DeviceError('the hand is not connected; connect it first')
-        self._params.check(command, self.stop)
         self.hand.command(self.fingers.slide, command)
 
     def stop(self) -> None:

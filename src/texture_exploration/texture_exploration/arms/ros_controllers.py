@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """An arm that ROS drives: a twist controller, poses and wrenches on topics.
 
-It commands velocities, and reads pose and force, over standard topics. The force is controlled by the velocity loop of
-the suite, or by a compliance controller if one is named. This file knows no ROS: the topics are behind
-`ControllerTopics`.
+It commands velocities, and reads pose and force, over standard topics; the velocity loop of the suite controls the
+force. This file knows no ROS: the topics are behind `ControllerTopics`.
 """
 
 from __future__ import annotations
@@ -13,15 +12,13 @@ import importlib
 import logging
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Protocol
 
 from texture_core.errors import DeviceError
 from texture_exploration.arms.arm import (
-    RISE_M_S,
     STANDSTILL,
-    UNSTEADY,
     ArmCommand,
     ArmState,
     CommandedVelocity,
@@ -62,12 +59,6 @@ class ControllerTopics(Protocol):
 
     def send_velocity(self, velocity_m_s: Vector) -> None:
         """Command a velocity in the frame `twist_frame_id`."""
-
-    def send_force(self, force_n: Vector) -> None:
-        """Command the force of the tool on its surroundings in the base frame; no effect without such a topic."""
-
-    def switch_controllers(self, activate: Sequence[str], deactivate: Sequence[str]) -> None:
-        """Let the controller manager switch both sets or nothing; DeviceError, with the reason, if it does not."""
 
     def close(self) -> None:
         """Wait until what was sent has arrived, and leave; the guard stays until an arm that may still move rests."""
@@ -115,12 +106,12 @@ class RosControllersArm(SurfaceArm):
     """
 
     Params = RosControllersParams
+    force_reading = ForceReading.NOISY
     _params: RosControllersParams
     _state: ArmState
     _command: tuple[ArmCommand, int] | None  # and when it came
     _commanded: Vector
     _sent_ns: int
-    _pressing: bool
 
     def __init__(
         self,
@@ -133,14 +124,10 @@ class RosControllersArm(SurfaceArm):
         self._clock = clock
         self._open_topics = open_topics
         self._own_thread = own_thread
-        self._switches = params.activate_controllers.split(), params.deactivate_controllers.split()
-        self.force_reading = ForceReading.MEASURED if params.force_is_quantised else ForceReading.NOISY
         self._topics: ControllerTopics | None = None
         self._thread: threading.Thread | None = None
         self._closing = threading.Event()
         self._late = 0
-        self._switched = False  # controllers were switched for this connection
-        self._hand_over_fault = ''
         self._restart()
 
     def check(self) -> None:
@@ -167,10 +154,8 @@ class RosControllersArm(SurfaceArm):
         """
         topics = self._begin()
         try:
-            self._take_over(topics)
             self._wait_for_controllers(topics)
         except DeviceError:
-            self._give_back(topics)
             topics.close()
             raise
         self._closing.clear()
@@ -188,10 +173,8 @@ class RosControllersArm(SurfaceArm):
             self._thread = None
         topics, self._topics = self._topics, None
         if topics is not None:
-            self._stop_pressing(topics)
             topics.send_velocity(REST)
             topics.beat(moving=not self._tool.rest.at_rest)
-            self._give_back(topics)
             topics.close()
 
     def state(self) -> ArmState:
@@ -210,17 +193,18 @@ class RosControllersArm(SurfaceArm):
     def command(self, command: ArmCommand) -> None:
         """Follow a command from the next period on.
 
-        A command with a force lifts the finger first until the force sensor is zeroed, which takes proven free air.
+        The force sensor is zeroed in free air only, at rest after a rise of 3 mm without a change of the force.
 
         Raises
         ------
         CommandRefused
-            If a number is not finite or out of its range; the arm stops.
+            If a number is not finite or out of its range, or a force is wanted before the force sensor was zeroed since
+            the arm was connected, recovered or in a fault; the arm stops.
         DeviceError
             If the arm is not connected.
         """
         self._connected()
-        self._params.check(command, self.stop)
+        self._check(command)
         self._command = (command, self._clock())
 
     def stop(self) -> None:
@@ -281,7 +265,6 @@ class RosControllersArm(SurfaceArm):
             self._failed = self._unsafe = reason
             self._command = None
             self._commanded = REST
-            self._stop_pressing(topics)
             topics.send_velocity(REST)
             self._state = replace(self._state, unsafe=reason, fault=self._lost)
 
@@ -305,7 +288,7 @@ class RosControllersArm(SurfaceArm):
         self._state = replace(self._tool.state(fault), unsafe=self._unsafe)
         self._zeroed = self._tool.zero.zeroed  # after the state, so that a reader finds the zeroed force
         self._carry_out(topics, self._due(now_ns), held_s)
-        topics.beat(moving=not self._tool.rest.at_rest or self._pressing)
+        topics.beat(moving=not self._tool.rest.at_rest)
 
     def _begin(self) -> ControllerTopics:
         """Close an earlier connection, and open the topics of a new one."""
@@ -323,35 +306,19 @@ class RosControllersArm(SurfaceArm):
         self._command = None
         self._commanded = REST
         self._sent_ns = self._gone_ns = self._halted_ns = 0
-        self._pressing = False  # a compliance controller was commanded a force
         self._zeroed = False
         self._resting_first = True
         self._unsafe = ''  # why it may only be lifted, until it is recovered or connected again
         self._lost = ''  # a fault that stays as long
         self._failed = ''  # with an internal error
 
-    def _take_over(self, topics: ControllerTopics) -> None:
-        if self._params.controller_manager:
-            topics.switch_controllers(*self._switches)
-            self._switched, self._hand_over_fault = True, ''
-
-    def _give_back(self, topics: ControllerTopics) -> None:
-        """Switch the controllers back; a failure is only reported."""
-        if not self._switched:
-            return
-        self._switched = False
-        try:
-            topics.switch_controllers(*reversed(self._switches))
-        except DeviceError as error:
-            self._hand_over_fault = f'the controllers were not switched back: {error}'
-
     def doubt(self) -> str:
         """Return in a sentence that the force is too late for force control, '' if not."""
-        return '' if self._params.target_wrench_topic else self._velocity.doubt()
+        return self._velocity.doubt()
 
     def warning(self) -> str:
-        """Return in a sentence that controllers were not switched back, or that clocks do not agree; '' if neither."""
-        return self._hand_over_fault or self._tool.skew
+        """Return in a sentence that clocks do not agree, '' if they do."""
+        return self._tool.skew
 
     def _connected(self) -> ControllerTopics:
         if self._topics is None:
@@ -425,7 +392,7 @@ class RosControllersArm(SurfaceArm):
 
     def _restless(self, now_ns: int, held_s: float) -> str:
         """Return in a sentence that the arm moves although zero velocity is commanded, '' if it does not."""
-        excused = self._tool.rest.at_rest or self._commanded != REST or self._pressing
+        excused = self._tool.rest.at_rest or self._commanded != REST
         if excused or held_s > HEARTBEAT_S or not self._halted_ns:
             self._halted_ns = now_ns
         if now_ns - self._halted_ns <= RESTS_WITHIN_NS:
@@ -448,49 +415,19 @@ class RosControllersArm(SurfaceArm):
         if self._unsafe:  # only a lift is allowed
             up_m_s = 0.0 if command[0].force_n is not None else max(0.0, command[0].normal_m_s)
             return ArmCommand(normal_m_s=up_m_s)
-        return self._lifted_first(command[0])
-
-    def _lifted_first(self, command: ArmCommand) -> ArmCommand | None:
-        """Return the command, or what comes before it as long as the force sensor is not zeroed."""
-        zero, height_m = self._tool.zero, self._state.position[2]
-        if command.force_n is None or zero.zeroed:
-            zero.air.seek(None)
-            return command
-        if zero.air.proven:
-            return None  # at rest it is zeroed
-        if zero.air.seek(height_m):
-            self._lost = UNSTEADY
-            return None
-        return ArmCommand(normal_m_s=RISE_M_S)
+        pressed = command[0].force_n is not None
+        return command[0] if self._tool.zero.zeroed or not pressed else None
 
     def _carry_out(self, topics: ControllerTopics, command: ArmCommand | None, held_s: float) -> None:
         state = self._state
         if command is not None and command.force_n is not None:
             self._tool.zero.presume_contact()
-            self._press(topics, command)
-        else:
-            self._stop_pressing(topics)
-        velocity = REST if state.fault else self._chosen(command or STANDSTILL, state, held_s)
-        if velocity != REST or self._pressing:
+        velocity = REST if state.fault else self._velocity.choose(command or STANDSTILL, state, held_s)
+        if velocity != REST:
             self._tool.rest.forget()
         if not self._tool.rest.at_rest:
             self._send(topics, velocity)
         self._commanded = velocity
-
-    def _press(self, topics: ControllerTopics, command: ArmCommand) -> None:
-        if self._params.target_wrench_topic:
-            topics.send_force(self._frame.to_base((0.0, 0.0, -(command.force_n or 0.0))))
-            self._pressing = True
-
-    def _stop_pressing(self, topics: ControllerTopics) -> None:
-        if self._pressing:
-            topics.send_force(REST)
-            self._pressing = False
-
-    def _chosen(self, command: ArmCommand, state: ArmState, held_s: float) -> Vector:
-        if command.force_n is not None and self._params.target_wrench_topic:
-            command = replace(command, force_n=None, normal_m_s=0.0)
-        return self._velocity.choose(command, state, held_s)
 
     def _send(self, topics: ControllerTopics, velocity: Vector) -> None:
         in_base = self._frame.to_base(velocity)
@@ -514,5 +451,4 @@ class RosControllersArm(SurfaceArm):
                 self._closing.wait(max(0.0, left_s))
         finally:
             # Also when a bug ends the loop: no arm is left moving.
-            self._stop_pressing(topics)
             topics.send_velocity(REST)

@@ -41,25 +41,12 @@ class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams, Co
         'tcp_pose_broadcaster/pose', 'Topic of the measured pose of the fingertip in the base frame (PoseStamped).'
     )
     wrench_topic: str = param('force_torque_sensor_broadcaster/wrench', 'Topic of the measured force (WrenchStamped).')
-    target_wrench_topic: str = param(
-        '', "Topic of the commanded force (WrenchStamped) of a compliance controller that presses itself; '' has none."
-    )
     base_frame_id: str = param('base', 'Name of the base frame, which the measured pose must carry in its header.')
     tool_frame_id: str = param(
         'tool0_controller', 'Name of the frame of the fingertip; a force is given in this frame or in the base frame.'
     )
     twist_frame_id: str = param(
         '', "Frame in which velocities are commanded, the base frame or that of the fingertip; '' is the base."
-    )
-    controller_manager: str = param(
-        '', "Controller manager that switches controllers when the arm is connected and released; '' switches nothing."
-    )
-    activate_controllers: str = param(
-        'twist_controller', 'Controllers, separated by spaces, that are active only while the arm is connected.'
-    )
-    deactivate_controllers: str = param(
-        'scaled_joint_trajectory_controller',
-        'Controllers, separated by spaces, that are inactive only while the arm is connected.',
     )
     rate_hz: float = param(
         250.0,
@@ -92,14 +79,8 @@ class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams, Co
     deadman_s: float = param(
         0.08, 'Age of pose or force above which zero velocity is commanded.', unit='s', low=0.01, high=2.0
     )
-    tool_mass_kg: float = param(
-        0.0, 'Mass of a tool whose weight the sensor shows; 0 if it shows none.', unit='kg', low=0.0, high=20.0
-    )
     invert_force: bool = param(
         False, 'Inverts the measured force, for a sensor that reports what the tool does to its surroundings.'
-    )
-    force_is_quantised: bool = param(
-        False, 'Lets a measured force repeat itself, as of a sensor that rounds, without counting as frozen.'
     )
     force_smoothing_s: float = param(
         0.0, 'Time constant of the low-pass filter of the force; it delays the loop.', unit='s', low=0.0, high=0.1
@@ -193,9 +174,8 @@ class FollowWatch:
 
 
 # --------------------
-# State of a fingertip from stamped poses and forces: frames, velocity, weight of the tool, zero, age and rest.
+# State of a fingertip from stamped poses and forces: frames, velocity, zero, age and rest.
 
-GRAVITY_M_S2 = 9.81
 VELOCITY_OVER_NS = 30_000_000
 STILL_M_S = 1e-4  # a slower finger is at rest: below is the noise of its position
 AGREE_NS = 1_000_000_000  # clocks by which a sample is older than this, or comes from the future, do not agree
@@ -225,7 +205,7 @@ class ToolState:
         self._position: Vector = (math.nan, math.nan, math.nan)
         self._velocity = REST
         self._force_n = math.nan
-        self._force_vector_n: Vector = (math.nan, math.nan, math.nan)  # zeroed, without the weight, not smoothed
+        self._force_vector_n: Vector = (math.nan, math.nan, math.nan)  # zeroed, not smoothed
         self._reading_n: Array | None = None  # of the sensor, as it came
         self._track: deque[tuple[int, Vector]] = deque()
 
@@ -263,11 +243,10 @@ class ToolState:
         reading = np.array(sample.force_n) * (-1.0 if params.invert_force else 1.0)
         repeated = self._reading_n is not None and bool((reading == self._reading_n).all())
         self._reading_n = reading
-        # What the sensor shows of the weight turns with it; what is left in free air is its offset.
-        unweighted = reading - to_base.T @ np.array([0.0, 0.0, -params.tool_mass_kg * GRAVITY_M_S2])
         zeroings = self.zero.zeroings
-        self.zero.update(now_ns, self._position, self._at_surface(to_base, unweighted)[2], unweighted, moving=moving)
-        self._force_vector_n = self._at_surface(to_base, unweighted - self.zero.offset_n)
+        # What is left in free air is the offset of the sensor, and the weight of the tool, which never turns.
+        self.zero.update(now_ns, self._position, self._at_surface(to_base, reading)[2], reading, moving=moving)
+        self._force_vector_n = self._at_surface(to_base, reading - self.zero.offset_n)
         # What was smoothed had another zero; and a frozen reading must stay one to the last bit.
         if self.zero.zeroings != zeroings or not before_ns:
             self._force_n = self._force_vector_n[2]

@@ -25,7 +25,6 @@ from texture_core.errors import DeviceError
 from texture_core.types import loopback_address
 from texture_exploration.arms.arm import (
     STANDSTILL,
-    UNSTEADY,
     ArmCommand,
     ArmState,
     ForceReading,
@@ -121,9 +120,9 @@ class UrCommand(NamedTuple):
 class UrReport(NamedTuple):
     """Newest measurement of the controller, in the base frame, and its status.
 
-    `time_ns` is when it arrived, of CLOCK_MONOTONIC. `force_n` is the force of the surroundings on the tool. `unsteady`
-    says that the force sensor could not be zeroed, because the force changed while the finger rose; `zeroed`,
-    that it was, since the arm was connected or recovered. `watchdog_s` is how long the controller's watchdog waits.
+    `time_ns` is when it arrived, of CLOCK_MONOTONIC. `force_n` is the force of the surroundings on the tool; `zeroed`
+    says that its sensor was zeroed since the arm was connected or recovered. `watchdog_s` is how long the controller's
+    watchdog waits.
 
     `counts` are totals since the arm was connected. `late`: gaps of more than 20 ms in what the controller sends.
     `refused`: commands that it did not accept. `zeroed`: zeroings of the force sensor. `slow_acknowledgements`:
@@ -139,7 +138,6 @@ class UrReport(NamedTuple):
     safety_mode: int
     playing: bool
     silent: bool
-    unsteady: bool
     zeroed: bool
     counts: Mapping[str, int]
 
@@ -176,12 +174,6 @@ class UrArmParams(ZeroingParams, SurfacePoseParams, CommandLimits):
     silence_s: float = param(
         0.1, 'How long the controller may send no state before that is a fault.', unit='s', low=0.02, high=2.0
     )
-    take_over: bool = param(
-        False, 'Stops a program of another user that runs or pauses on the controller; false refuses to connect.'
-    )
-    upper_range_registers: bool = param(
-        False, 'Uses the registers 24 to 47, so that a fieldbus (EtherNet/IP, PROFINET) may keep 0 to 23.'
-    )
     connect_timeout_s: float = param(
         10.0, 'How long the arm may take to be ready before connecting fails.', unit='s', low=0.5, high=60.0
     )
@@ -216,16 +208,11 @@ class WorkerLink:
         self._channel, end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         command = [sys.executable, '-m', MODULE, str(end.fileno()), json.dumps(dataclasses.asdict(params))]
         with end:
-            self._process = subprocess.Popen(
+            self.process = subprocess.Popen(
                 command, pass_fds=[end.fileno(), lock], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL
             )
         self._reader = threading.Thread(target=self._read, name='ur_link', daemon=True)
         self._reader.start()
-
-    @property
-    def pid(self) -> int:
-        """Number of the process."""
-        return self._process.pid
 
     def wait_for_report(self) -> None:
         """Return when the first report has come."""
@@ -257,10 +244,10 @@ class WorkerLink:
         """Stop the arm and end the worker; kill it if it does not end: then the watchdog stops the arm."""
         self._channel.shutdown(socket.SHUT_RDWR)
         try:
-            self._process.wait(self._stopping_s)
+            self.process.wait(self._stopping_s)
         except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+            self.process.kill()
+            self.process.wait()
         self._reader.join()
         self._channel.close()
 
@@ -284,7 +271,7 @@ class WorkerLink:
         self._reader.join(FINAL_MESSAGE_S)  # the last message of the worker may still be on its way
         if self._failure:
             return self._failure
-        if self._process.poll() == -signal.SIGALRM:
+        if self.process.poll() == -signal.SIGALRM:
             return 'the controller stopped answering in the middle of a command; look at its pendant, and connect again'
         return 'the process that talks to the controller ended; connect again'
 
@@ -296,23 +283,18 @@ class WorkerLink:
 
 RTDE_PORT = 30004
 DASHBOARD_PORT = 29999
-DASHBOARD_BANNER = 'Universal Robots Dashboard Server'
-FIRST_WITHOUT_DASHBOARD = 10  # PolyScope X
+FIRST_WITHOUT_DASHBOARD = 10  # PolyScope X: neither its safety nor its programs can be asked for
 FIRST_WITH_REMOTE_CONTROL = (5, 6)
 # Oldest software by series: the oldest CB3 that ur-rtde 1.6.5 is tested with (its README); an e-Series with remote
-# control; a PolyScope X that takes programs on the port that ur-rtde uses.
-OLDEST: Mapping[int, tuple[int, int]] = {3: (3, 12), 5: (5, 6), 10: (10, 10)}
+# control.
+OLDEST: Mapping[int, tuple[int, int]] = {3: (3, 12), 5: (5, 6)}
 CB3 = 3  # the series without a force sensor in the flange
-CONTROL_SCRIPT = 'rtde_control'  # the program of ur-rtde
-# Register of its commands, for one client only. By whether the upper range is used (FLAG_UPPER_RANGE_REGISTERS).
-COMMAND_REGISTERS: Mapping[bool, str] = {False: 'input_int_register_0', True: 'input_int_register_24'}
 
 REQUEST_VERSION = 86  # 'V', types of RTDE messages
 CONTROLLER_VERSION = 118  # 'v'
-SETUP_OUTPUTS, SETUP_INPUTS, START, DATA = 79, 73, 83, 85
 PROTOCOL_VERSION = 2
 
-PROGRAM_STOPPED, PROGRAM_PLAYING = 1, 2  # runtime_state
+PROGRAM_PLAYING = 2  # runtime_state
 
 # safety_mode -> why the arm cannot move; what is not listed lets it move
 SAFETY_FAULTS: Mapping[int, str] = {
@@ -342,8 +324,6 @@ STOP_DECELERATION_M_S2 = 10.0  # the default of ur-rtde
 # ur-rtde waits without a limit for a controller that does not answer; so it only connects to one that does.
 
 HEADER = struct.Struct('>HB')
-STATE = struct.Struct('>BI')  # recipe, runtime state
-RUNTIME_HZ = 10.0
 FREE_MODES = ('NORMAL', 'REDUCED')
 UNLOCK_WAIT_S = 8.0  # the controller refuses for 5 s
 UNLOCK_RETRY_S = 0.25
@@ -360,35 +340,9 @@ def rtde_version(ip: str, timeout_s: float) -> tuple[int, int]:
     return major, minor
 
 
-def runtime_state(ip: str, timeout_s: float) -> int:
-    """Return the runtime state of the controller: 1 if no program runs or pauses."""
-    with closing(TcpConnection(ip, RTDE_PORT, timeout_s)) as line:
-        _ask(line, REQUEST_VERSION, struct.pack('>H', PROTOCOL_VERSION))
-        _ask(line, SETUP_OUTPUTS, struct.pack('>d', RUNTIME_HZ) + b'runtime_state')
-        _ask(line, START, b'')
-        data = _await(line, DATA)
-    if len(data) != STATE.size:
-        raise DeviceError(f'{ip}:{RTDE_PORT} does not report whether a program runs; is it a UR controller?')
-    state: int
-    _, state = STATE.unpack(data)
-    return state
-
-
-def claims_register(ip: str, name: str, timeout_s: float) -> bool:
-    """Return whether an input register is free, by claiming it for a moment."""
-    with closing(TcpConnection(ip, RTDE_PORT, timeout_s)) as line:
-        _ask(line, REQUEST_VERSION, struct.pack('>H', PROTOCOL_VERSION))
-        return b'IN_USE' not in _ask(line, SETUP_INPUTS, name.encode())
-
-
 def _ask(line: TcpConnection, kind: int, payload: bytes) -> bytes:
-    """Send a message and return the payload of the answer of the same type."""
+    """Send a message and return the payload of the answer of the same type; others, such as texts, are skipped."""
     line.send(HEADER.pack(HEADER.size + len(payload), kind) + payload)
-    return _await(line, kind)
-
-
-def _await(line: TcpConnection, kind: int) -> bytes:
-    """Return the payload of the next message of a type; others, such as texts, are skipped."""
     while True:
         size, answered = HEADER.unpack(line.read(HEADER.size))
         answer = line.read(max(0, size - HEADER.size))
@@ -401,13 +355,7 @@ class DashboardClient(TcpConnection):
 
     def __init__(self, ip: str, timeout_s: float) -> None:
         super().__init__(ip, DASHBOARD_PORT, timeout_s)
-        try:
-            banner = self.read_line()
-            if DASHBOARD_BANNER not in banner:
-                raise DeviceError(f"{self._where} greets with '{banner}' and not as the dashboard of a UR controller")
-        except DeviceError:
-            self.close()
-            raise
+        self.read_line()  # its greeting
 
     def ask(self, line: str) -> str:
         """Return the answer to a command."""
@@ -420,8 +368,6 @@ def check_ready(ip: str, timeout_s: float) -> tuple[int, int]:
     end_s = time.monotonic() + timeout_s
     version = rtde_version(ip, timeout_s)
     _check_version(ip, version)
-    if version[0] >= FIRST_WITHOUT_DASHBOARD:
-        return version
     with closing(DashboardClient(ip, max(0.1, end_s - time.monotonic()))) as dashboard:
         mode = dashboard.ask('robotmode')
         if 'RUNNING' not in mode:
@@ -438,6 +384,11 @@ def check_ready(ip: str, timeout_s: float) -> tuple[int, int]:
 
 
 def _check_version(ip: str, version: tuple[int, int]) -> None:
+    if version[0] >= FIRST_WITHOUT_DASHBOARD:
+        raise DeviceError(
+            f'the controller at {ip} has the software {version[0]}.{version[1]} (PolyScope X) without a dashboard, by '
+            "which the arm 'ur' checks safety and programs; use the arm 'ros_controllers' with ur_robot_driver"
+        )
     oldest = OLDEST.get(version[0], min(OLDEST.values()))
     if version < oldest:
         raise DeviceError(
@@ -472,50 +423,39 @@ UR_PROGRAM_STOPPING_S = 2.0
 WATCHDOG_S = 0.5  # in addition to its period, until it has ended a program
 
 
-def check_program(params: UrArmParams, version: tuple[int, int], *, pause_is_ours: bool) -> None:
-    """Return if no program runs or pauses on the controller, or only one that is not needed.
+def check_program(params: UrArmParams, *, pause_is_ours: bool) -> None:
+    """Return if no program runs or pauses on the controller.
 
-    A stop by the safety system may pause the program of the connection before: `pause_is_ours`. A control script of
-    ours whose process was killed is ended by its watchdog; one without a watchdog is known by its name and by no
-    client that writes its command register.
+    A stop by the safety system may pause the program of the connection before: `pause_is_ours`, and is stopped. A
+    control script of ours whose process was killed is ended by its watchdog.
     """
     ip, timeout_s = params.ip, PROBE_S
     end_s = time.monotonic() + max(ACKNOWLEDGE_S, 1.0 / params.watchdog_hz) + WATCHDOG_S
-    while program := _program(ip, version, timeout_s):
-        if params.take_over or (pause_is_ours and program.upper().startswith('PAUSED')):
-            break
+    while program := _program(ip, timeout_s):
+        if pause_is_ours and program.upper().startswith('PAUSED'):
+            _stop(ip, timeout_s)
+            return
         if time.monotonic() > end_s:
-            register = COMMAND_REGISTERS[params.upper_range_registers]
-            if CONTROL_SCRIPT in program and claims_register(ip, register, timeout_s):
-                break
             raise DeviceError(
                 f"another program is on the controller at {ip} ('{program}'), and connecting would stop it; stop it on "
-                "the pendant, or set parameter 'take_over' to true"
+                'the pendant'
             )
         time.sleep(SAMPLE_PERIOD_S)
-    else:
-        return
-    _stop(ip, version, timeout_s)
 
 
-def _program(ip: str, version: tuple[int, int], timeout_s: float) -> str:
+def _program(ip: str, timeout_s: float) -> str:
     """Return the program that runs or pauses, as the controller reports it; '' if there is none."""
-    if version[0] >= FIRST_WITHOUT_DASHBOARD:
-        runtime = runtime_state(ip, timeout_s)
-        return '' if runtime == PROGRAM_STOPPED else f'runtime state {runtime}'
     with closing(DashboardClient(ip, timeout_s)) as dashboard:
         running, state = dashboard.ask('running'), dashboard.ask('programState')
     return state if 'true' in running.lower() or not state.upper().startswith('STOPPED') else ''
 
 
-def _stop(ip: str, version: tuple[int, int], timeout_s: float) -> None:
-    """Stop it by the dashboard; without a dashboard ur-rtde stops it."""
-    if version[0] >= FIRST_WITHOUT_DASHBOARD:
-        return
+def _stop(ip: str, timeout_s: float) -> None:
+    """Stop it."""
     with closing(DashboardClient(ip, timeout_s)) as dashboard:
         dashboard.ask('stop')
     end_s = time.monotonic() + UR_PROGRAM_STOPPING_S
-    while program := _program(ip, version, timeout_s):
+    while program := _program(ip, timeout_s):
         if time.monotonic() > end_s:
             raise DeviceError(
                 f"the program on the controller at {ip} ('{program}') does not stop; stop it on the pendant"
@@ -564,7 +504,7 @@ class UrArm(SurfaceArm):
         Raises
         ------
         DeviceError
-            If it cannot be reached, its arm cannot move, or a program of another user is there; see `take_over`.
+            If it cannot be reached, its arm cannot move, or a program of another user is there.
         """
         self.close()
         if importlib.util.find_spec('rtde_control') is None:
@@ -576,7 +516,7 @@ class UrArm(SurfaceArm):
         try:
             self._lock = claim(f'ur {params.ip}', UR_LINK_STOPPING_S + ACKNOWLEDGEMENTS * ACKNOWLEDGE_S)
             version = check_ready(params.ip, PROBE_S)
-            check_program(params, version, pause_is_ours=self._paused)
+            check_program(params, pause_is_ours=self._paused)
             self._link, self._series = WorkerLink(params, self._lock), version[0]
             self._link.wait_for_report()
         except DeviceError:
@@ -622,17 +562,17 @@ class UrArm(SurfaceArm):
     def command(self, command: ArmCommand) -> None:
         """Send a command to the worker.
 
-        The force sensor is zeroed in free air only, which a rise of 3 mm without a change of the force proves.
-        As long as it has not been zeroed since the arm was connected or recovered, a command with a force lifts first.
+        The force sensor is zeroed in free air only, at rest after a rise of 3 mm without a change of the force.
 
         Raises
         ------
         CommandRefused
-            If a number is not finite or out of its range; the arm stops.
+            If a number is not finite or out of its range, or a force is wanted before the force sensor was zeroed since
+            the arm was connected or recovered; the arm stops.
         DeviceError
             If the arm cannot be reached.
         """
-        self._params.check(command, self.stop)
+        self._check(command)
         if command == STANDSTILL:
             self.stop()
             return
@@ -670,11 +610,6 @@ class UrArm(SurfaceArm):
         return BASE_FRAME_ID
 
     @property
-    def worker_pid(self) -> int:
-        """Number of the process that talks to the controller."""
-        return self._connected().pid
-
-    @property
     def zeroed(self) -> bool:
         """Whether the force sensor was zeroed since the arm was connected or recovered."""
         return self._report().zeroed
@@ -700,6 +635,4 @@ class UrArm(SurfaceArm):
             return f'the controller is silent for more than {self._params.silence_s * 1e3:.0f} ms'
         if report.safety_mode in SAFETY_FAULTS:
             return SAFETY_FAULTS[report.safety_mode]
-        if not report.playing:
-            return 'its control program was stopped, by hand or by its watchdog'
-        return UNSTEADY if report.unsteady else ''
+        return '' if report.playing else 'its control program was stopped, by hand or by its watchdog'

@@ -20,7 +20,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from texture_core.config import from_mapping
-from texture_exploration.arms.arm import CALM_NS, RISE_M_S, ZERO_RISE_M, FreeAir, SurfaceFrame, Vector
+from texture_exploration.arms.arm import CALM_NS, ZERO_RISE_M, FreeAir, SurfaceFrame, Vector
 from texture_exploration.arms.ur import (
     ACCELERATION_M_S2,
     ACKNOWLEDGE_S,
@@ -71,11 +71,6 @@ class Watchdog:
         self._patient_s = max(ACKNOWLEDGE_S, self._period_s)
         self._guard = guard
         self._clock = clock
-
-    @property
-    def widened(self) -> bool:
-        """Whether the controller waits longer than 1 / `watchdog_hz` while the arm moves."""
-        return self.moving_s > self._period_s
 
     def arm(self) -> bool:
         """Let the watchdog guard a moving arm; return whether the controller agreed.
@@ -138,15 +133,13 @@ class UrCommandStream:
     def __init__(self, control: Any, params: UrArmParams, watchdog: Watchdog) -> None:
         self.refused = 0
         self.zeroings = 0
-        self.trusted = self.unsteady = False
+        self.trusted = False
         self._control = control
         self._params = params
         self._watchdog = watchdog
         self._frame = SurfaceFrame(params.surface_pose)
-        self._up = self._frame.to_base((0.0, 0.0, RISE_M_S))
         self._air = FreeAir(ZERO_RISE_M, params.zero_steady_n)
         self._measured_ns = self._rest_ns = 0
-        self._height_m = 0.0
         self._mode = Mode.STANDSTILL
         self._braking = False
         self._next_is_speed = False
@@ -155,13 +148,13 @@ class UrCommandStream:
 
     def observe(self, time_ns: int, position_m: Vector, force_n: Vector) -> None:
         """Take the newest measurement of the controller, in the base frame."""
-        place = self._frame.place(position_m)
-        self._height_m, self._measured_ns = place[2], time_ns
-        self._air.update(time_ns, place, self._frame.direction(force_n)[2])
+        self._measured_ns = time_ns
+        self._air.update(time_ns, self._frame.place(position_m), self._frame.direction(force_n)[2])
 
     def cycle(self, ur_command: UrCommand | None) -> None:
-        """Send what is due; None commands standstill."""
-        ur_command = self._lifted_first(ur_command)
+        """Send what is due; None commands standstill, and so does a force before the force sensor is zeroed."""
+        if ur_command is not None and ur_command.force_n is not None and not self.trusted:
+            ur_command = None
         mode = _mode(ur_command)
         self._braking &= mode is Mode.STANDSTILL
         if mode is not self._mode and not self._change(mode, ur_command):
@@ -179,21 +172,8 @@ class UrCommandStream:
         """The program on the controller was started again: the arm is at rest, in contact or not."""
         self._mode = Mode.STANDSTILL
         self._braking = False
-        self.trusted = self.unsteady = False
-        self._air.seek(None)
+        self.trusted = False
         self._air.presume_contact()
-
-    def _lifted_first(self, ur_command: UrCommand | None) -> UrCommand | None:
-        """Return the command, or first a rise and a rest if it needs a force sensor that is not zeroed."""
-        if ur_command is None or ur_command.force_n is None or self.trusted:
-            self._air.seek(None)
-            return ur_command
-        if self.unsteady:
-            return None
-        if self._air.proven:
-            return ur_command if self._mode is Mode.STANDSTILL else None
-        self.unsteady = self._air.seek(self._height_m)
-        return ur_command._replace(velocity_m_s=self._up, force_n=None)
 
     def _change(self, mode: Mode, ur_command: UrCommand | None) -> bool:
         """Leave the present mode; return whether the new one has begun."""
@@ -206,9 +186,10 @@ class UrCommandStream:
             self._braking = True
             self._count(bool(self._control.speedL([0.0] * 6, STOP_DECELERATION_M_S2, 1.0 / RATE_HZ)))
             return False
-        if not self._leave(mode):
-            return False
-        if not self._guarded(mode):
+        self._leave(mode)
+        # The watchdog guards every mode but standstill; at rest one that waits too long is set again.
+        late = self._mode is Mode.STANDSTILL and self._watchdog.moving_s > 1.0 / self._params.watchdog_hz
+        if mode is not Mode.STANDSTILL and (late or not self._watchdog.armed) and not self._watchdog.arm():
             self._count(False)
             return False
         self._mode = mode
@@ -216,24 +197,13 @@ class UrCommandStream:
         self._braking = self._next_is_speed = False
         return True
 
-    def _guarded(self, mode: Mode) -> bool:
-        """Return whether the watchdog guards a mode; at rest one that waits too long is set again."""
-        if mode is Mode.STANDSTILL:
-            return True
-        late = self._mode is Mode.STANDSTILL and self._watchdog.widened
-        return self._watchdog.arm() if late or not self._watchdog.armed else True
-
-    def _leave(self, mode: Mode) -> bool:
-        """Do what ends the present mode; return whether that is enough for the new one."""
+    def _leave(self, mode: Mode) -> None:
+        """Do what ends the present mode."""
         if mode is Mode.STANDSTILL:
             self.stand_still()
         elif self._mode is Mode.FORCE:
             with self._watchdog.patient():
                 self._count(self._watchdog.call(self._control.forceModeStop))
-        elif self._mode is Mode.STANDSTILL and self._air.proven:
-            with self._watchdog.patient():
-                return self._zero()
-        return True
 
     def _stop(self) -> None:
         """Come to rest; these commands are acknowledged, so nothing overwrites them."""
@@ -242,23 +212,18 @@ class UrCommandStream:
             self._count(self._watchdog.call(self._control.forceModeStop))
         self._mode = Mode.STANDSTILL
 
-    def _zero(self) -> bool:
-        """Zero the force sensor, at rest and in free air; return whether the controller did."""
-        taken = self._watchdog.call(self._control.zeroFtSensor)
-        self._count(taken)
-        if not taken:
-            self._rest_ns = self._measured_ns  # free air is still proven: try again after another rest
-            return False
-        self.trusted = True
-        self.zeroings += 1
-        self._air.presume_contact()  # the force is another one now; the next zeroing needs a new proof
-        return True
-
     def _hold_still(self, _ur_command: UrCommand | None) -> bool:
         """Zero the force sensor as soon as the arm has calmed down in free air."""
         if self._air.proven and self._measured_ns - self._rest_ns > CALM_NS:
             with self._watchdog.patient():
-                self._zero()
+                taken = self._watchdog.call(self._control.zeroFtSensor)
+            self._count(taken)
+            if taken:
+                self.trusted = True
+                self.zeroings += 1
+                self._air.presume_contact()  # the force is another one now; the next zeroing needs a new proof
+            else:
+                self._rest_ns = self._measured_ns  # free air is still proven: try again after another rest
         return bool(self._control.kickWatchdog())
 
     def _speed(self, ur_command: UrCommand) -> bool:
@@ -327,15 +292,14 @@ LOST = 'the connection to the controller was lost; is it still on, and the cable
 class Observer:
     """Reports the measurements of the controller, in a separate thread: commands may take a while.
 
-    `newest` is the last report, None before the first; `unsteady`, `zeroed`, `watchdog_s` and `counts` come from the
-    other thread.
+    `newest` is the last report, None before the first; `zeroed`, `watchdog_s` and `counts` come from the other thread.
 
     Silence counts only while this thread is awake, so that a stalled machine is not reported as a dead controller.
     """
 
     def __init__(self, receive: Any, channel: socket.socket, params: UrArmParams) -> None:
         self.connected = True
-        self.silent = self.unsteady = self.zeroed = False
+        self.silent = self.zeroed = False
         self.watchdog_s = 1.0 / params.watchdog_hz
         self.counts: Mapping[str, int] = {}
         self.newest: UrReport | None = None
@@ -384,7 +348,6 @@ class Observer:
             safety_mode=receive.getSafetyMode(),
             playing=receive.getRuntimeState() == PROGRAM_PLAYING,
             silent=self.silent,
-            unsteady=self.unsteady,
             zeroed=self.zeroed,
             counts={'late': self._late, **self.counts},
         )
@@ -408,8 +371,6 @@ class Worker:
         control_class = importlib.import_module('rtde_control').RTDEControlInterface
         # Remote control has been checked already.
         flags = control_class.FLAG_UPLOAD_SCRIPT | control_class.FLAG_DISABLE_REMOTE_CONTROL_CHECK
-        if params.upper_range_registers:
-            flags |= control_class.FLAG_UPPER_RANGE_REGISTERS
         receive = receive_class(params.ip, RATE_HZ, VARIABLES)
         self._control = control_class(params.ip, RATE_HZ, flags)
         self._observer = Observer(receive, channel, params)
@@ -462,7 +423,7 @@ class Worker:
         """Pass on to the observer what it reports in addition to the measurements."""
         commands, watchdog = self._commands, self._watchdog
         # After the cycle and not at once: a force that is reported as zeroed is from after the zeroing.
-        self._observer.unsteady, self._observer.zeroed = commands.unsteady, commands.trusted
+        self._observer.zeroed = commands.trusted
         self._observer.watchdog_s = watchdog.moving_s
         self._observer.counts = {
             'refused': commands.refused,

@@ -6,11 +6,10 @@ from __future__ import annotations
 
 import contextlib
 import copy
-import importlib
 import itertools
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any
@@ -26,9 +25,17 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 from texture_msgs import action, msg, srv
+from tf2_msgs.msg import TFMessage
 
 from texture_core.config import find, param, parameters_of
-from texture_core.errors import DeviceError, ExplorationError, InvalidData, InvalidParameter, MotionRefused, UnknownName
+from texture_core.errors import (
+    ExplorationError,
+    InvalidData,
+    InvalidParameter,
+    MotionRefused,
+    TextureError,
+    UnknownName,
+)
 from texture_core.ros import (
     ESTIMATE_QOS,
     SENSOR_QOS,
@@ -44,7 +51,6 @@ from texture_core.ros import (
     quality_of_service,
     run,
     to_msg,
-    to_stamp,
 )
 from texture_core.types import ExplorationState, Phase, RoughnessEstimate, TextureEstimate, quaternion
 from texture_exploration.arms.arm import ENDING
@@ -65,102 +71,20 @@ from texture_exploration.motions import DEFAULTS, MOTIONS
 from texture_exploration.safety import SafetyLimits, SurfacePatch
 from texture_exploration.touch import TouchParams
 
-# --------------------
-# Frames of surface and fingertip on tf, where tf2_msgs is installed.
-
 STATIC_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-MOVING_QOS = QoSProfile(depth=100)
-
-
-@dataclass(frozen=True)
-class FrameParams:
-    """Parameters of the frames in published messages."""
-
-    surface_frame_id: str = param(
-        'surface',
-        'Frame of the surface in the headers of the published states; in a namespace NAMESPACE/ is put before it.',
-    )
-    fingertip_frame_id: str = param(
-        'fingertip', 'Frame of the fingertip that is broadcast; in a namespace NAMESPACE/ is put before it.'
-    )
-    broadcast_surface: bool = param(
-        True, 'Broadcasts the surface in the base frame of the arm on /tf_static, if tf2_msgs is installed.'
-    )
-    broadcast_fingertip: bool = param(
-        False,
-        'Broadcasts where the fingertip is in the frame of the surface on /tf while it explores; leave it off if the '
-        'description of the robot holds the fingertip.',
-    )
-
-
-class FrameBroadcaster:
-    """Publish transforms of one arm."""
-
-    def __init__(self, node: Any, params: FrameParams) -> None:
-        self._node = node
-        self.surface_frame_id = frame_name(node.get_namespace(), params.surface_frame_id)
-        self._fingertip_frame_id = frame_name(node.get_namespace(), params.fingertip_frame_id)
-        self._static = self._moving = None
-        try:
-            self._kind = importlib.import_module('tf2_msgs.msg').TFMessage
-        except ImportError as error:
-            if params.broadcast_fingertip:
-                raise InvalidParameter(
-                    "parameter 'broadcast_fingertip' is true, which needs tf2_msgs; install it (ros-jazzy-tf2-msgs)"
-                ) from error
-            node.get_logger().info('no frame is published on tf, as tf2_msgs is not installed')
-            return
-        if params.broadcast_surface:
-            self._static = node.create_publisher(self._kind, '/tf_static', STATIC_QOS)
-        if params.broadcast_fingertip:
-            self._moving = node.create_publisher(self._kind, '/tf', MOVING_QOS)
-
-    def surface(self, base_frame_id: str, pose: Sequence[float]) -> None:
-        """Broadcast the pose of the surface in the base frame: place in m, then a rotation vector in rad, (6,)."""
-        if self._static is None:
-            return
-        transform = self._transform(base_frame_id, self.surface_frame_id, pose[:3])
-        transform.header.stamp = self._node.get_clock().now().to_msg()
-        turned = transform.transform.rotation
-        turned.x, turned.y, turned.z, turned.w = quaternion(pose[3:])
-        self._static.publish(self._kind(transforms=[transform]))
-
-    def fingertip(self, state: ExplorationState) -> None:
-        """Broadcast the position of the finger, with the axes of the surface; a state without one is skipped."""
-        if self._moving is None or state.x_m != state.x_m:
-            return
-        place = (state.x_m, state.y_m, state.z_m)
-        transform = self._transform(self.surface_frame_id, self._fingertip_frame_id, place)
-        transform.header.stamp = to_stamp(state.stamp_ns)
-        self._moving.publish(self._kind(transforms=[transform]))
-
-    @staticmethod
-    def _transform(parent: str, child: str, place_m: Sequence[float]) -> TransformStamped:
-        transform = TransformStamped(child_frame_id=child)
-        transform.header.frame_id = parent
-        shift = transform.transform.translation
-        shift.x, shift.y, shift.z = map(float, place_m)
-        return transform
-
-
 FEEDBACK_PERIOD_S = 0.05
 IDLE_PERIOD_S = 1.0
-# rclpy raises an error if one line of code logs at several levels, so each level has a separate line.
-LOGGED: dict[str, Callable[[Any, str], Any]] = {
-    'info': lambda logger, text: logger.info(text),
-    'warning': lambda logger, text: logger.warning(text),
-    'error': lambda logger, text: logger.error(text),
-}
+ESTIMATE_PERIOD_S = 0.005
 PRESSED = (
     'the force sensor shows {:.1f} N, so the finger may press, as after an explorer that was killed: `texture lift` '
-    "lifts it now, and the first exploration does so; 'lift_at_start: true' does so at every start"
+    'lifts it now, and the first exploration does so'
 )
 RESULT_KEPT_S = 60  # for a late client; rclpy's 15 min are hundreds of results
 
 
 @dataclass(frozen=True)
 class ExplorerParams:
-    """The arm, and when control of it is taken."""
+    """The arm, when control of it is taken, and the frame of the surface."""
 
     arm: str = param('simulated', "Arm that carries the finger: a name of the catalogue, or a user's 'module:Class'.")
     autostart: bool = param(
@@ -168,13 +92,18 @@ class ExplorerParams:
         'Configures and activates the node at start-up, which takes control of the arm; false leaves that to a '
         'lifecycle manager.',
     )
-    lift_at_start: bool = param(
-        False,
-        'Lifts the finger until nothing touches it whenever the node takes control of the arm, as an explorer that was '
-        'killed leaves it pressed.',
-    )
     estimate_timeout_s: float = param(
-        1.0, 'How long to wait for the final estimates after the finger was lifted.', unit='s', low=0.0, high=60.0
+        1.0,
+        'How long to wait for the final estimates after the finger was lifted; longer than the 0.3 s for which '
+        'feature_extractor waits for samples that do not come.',
+        unit='s',
+        low=0.0,
+        high=60.0,
+    )
+    surface_frame_id: str = param(
+        'surface',
+        'Frame of the surface, in the headers of the published states and on /tf_static; in a namespace NAMESPACE/ is '
+        'put before it.',
     )
 
 
@@ -187,11 +116,11 @@ class ExplorerNode(PatientLifecycleNode):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('explorer', **kwargs)
         params = declare(self, ExplorerParams)
-        self._estimate_timeout_s = params.estimate_timeout_s
+        self._estimate_timeout_s, self._autostart = params.estimate_timeout_s, params.autostart
+        self._surface_frame_id = frame_name(self.get_namespace(), params.surface_frame_id)
         self._explorer = self._make_explorer(params.arm)
-        self._frames = FrameBroadcaster(self, declare(self, FrameParams))
+        self._transforms = self.create_publisher(TFMessage, '/tf_static', STATIC_QOS)
         self._broadcast_surface()
-        self._follow_parameters()
         self._rng, self._numbers = np.random.default_rng(), itertools.count(1)
         self._open: dict[str, ExplorationEstimates] = {}  # explorations whose caller still waits, by id
         self._last_end, self._not_lifted = 'none', ''  # in sentences
@@ -222,13 +151,12 @@ class ExplorerNode(PatientLifecycleNode):
             'explore',
             self._on_goal,
             callback_group=group,
-            cancel_callback=_accept_cancel,
+            cancel_callback=lambda _goal: CancelResponse.ACCEPT,
             result_timeout=RESULT_KEPT_S,
         )
         self.create_timer(IDLE_PERIOD_S, self._publish_idle)
         Diagnostics(self, self._report)
         self._publish_idle()
-        self._autostart, self._lift_at_start = params.autostart, params.lift_at_start
         if self._autostart:
             self.trigger_configure()
             self.trigger_activate()
@@ -245,12 +173,12 @@ class ExplorerNode(PatientLifecycleNode):
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Take control of the arm; at the start of the node an arm that is not there yet is waited for."""
-        connected = self._tried(self._explorer.connect)
-        if connected and self._lift_at_start:
-            self._tried(self._explorer.lift)
-        elif connected:
-            self._tried(self._name_pressed)
-        if not (connected and self._tried(self._explorer.check_start)) and not self._autostart:
+        usable = (
+            self._tried(self._explorer.connect)
+            and self._tried(self._name_pressed)
+            and self._tried(self._explorer.check_start)
+        )
+        if not usable and not self._autostart:
             self._explorer.release()
             return TransitionCallbackReturn.FAILURE
         self._active = True
@@ -263,14 +191,9 @@ class ExplorerNode(PatientLifecycleNode):
             self.get_logger().warning(PRESSED.format(force_n))
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Lift the finger and release the arm."""
+        """Lift the finger and release the arm; a cleanup finds it released."""
         self._let_go()
         return super().on_deactivate(state)
-
-    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Do nothing: the arm was released by the deactivation."""
-        self._let_go()
-        return super().on_cleanup(state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Lift the finger and release the arm, from any state."""
@@ -291,7 +214,7 @@ class ExplorerNode(PatientLifecycleNode):
         """Return whether the arm allowed it; if not, log why."""
         try:
             step()
-        except (DeviceError, MotionRefused) as error:
+        except TextureError as error:
             more = '; the next request tries again' if self._autostart else ''
             self.get_logger().error(f'{error}{more}')
             return False
@@ -300,8 +223,6 @@ class ExplorerNode(PatientLifecycleNode):
     def shutdown(self) -> None:
         """Lift the finger, release the arm, end all waits of clients."""
         self._closing, current = True, self._explorer.current
-        for estimates in list(self._open.values()):
-            estimates.cancel()
         self._explorer.close()
         if current is not None:  # logged here, while this node still can
             outcome = current.outcome if current.ended.is_set() else STILL_MOVING
@@ -315,10 +236,11 @@ class ExplorerNode(PatientLifecycleNode):
     def _make_explorer(self, arm_name: str) -> Explorer:
         arm_class = find(ARMS, arm_name, 'arm')
         arm = arm_class(declare(self, arm_class.Params))
-        touch = declare(self, TouchParams, changeable=True)
-        limits = declare(self, SafetyLimits, changeable=True)
-        explorer = Explorer(arm, touch, limits, self._on_state, signal_fault=self._watch_signal())
-        explorer.patch = declare(self, SurfacePatch, changeable=True)
+        explorer = Explorer(arm, TouchParams(), SafetyLimits(), self._on_state, signal_fault=self._watch_signal())
+        # Changed parameters hold from the next exploration on; those of arm and sensor are fixed.
+        for name, kind in (('touch', TouchParams), ('limits', SafetyLimits), ('patch', SurfacePatch)):
+            setattr(explorer, name, declare(self, kind, changeable=True))
+            on_change(self, kind, partial(setattr, explorer, name))
         return explorer
 
     def _watch_signal(self) -> Callable[[Listening], str]:
@@ -341,12 +263,6 @@ class ExplorerNode(PatientLifecycleNode):
             )
         return watch.signal_fault
 
-    def _follow_parameters(self) -> None:
-        """Let changed parameters hold from the next exploration on; those of arm and sensor are fixed."""
-        on_change(self, TouchParams, partial(setattr, self._explorer, 'touch'))
-        on_change(self, SafetyLimits, partial(setattr, self._explorer, 'limits'))
-        on_change(self, SurfacePatch, partial(setattr, self._explorer, 'patch'))
-
     def _on_service(self, request: srv.Explore.Request, response: srv.Explore.Response) -> srv.Explore.Response:
         response.result = self._explore(request.request, lambda exploration: exploration.ended.wait())
         return response
@@ -368,7 +284,7 @@ class ExplorerNode(PatientLifecycleNode):
             exploration_id = new_id(self.get_clock().now().nanoseconds, next(self._numbers), self._rng)
             self._check_clock()
             exploration = self._explorer.begin(exploration_id, from_msg(request))
-        except (MotionRefused, UnknownName, InvalidData) as error:
+        except TextureError as error:
             result.error_code, result.message = int(refusal(error)), str(error)
             result.field = 'motion' if isinstance(error, UnknownName) else error.field
             # Their numbers are NaN, not the zeros that a new message holds.
@@ -379,7 +295,11 @@ class ExplorerNode(PatientLifecycleNode):
         estimates = self._open[exploration.exploration_id] = ExplorationEstimates(exploration.exploration_id)
         try:
             wait(exploration)
-            self._wait_for_final_estimates(exploration, estimates)
+            if exploration.outcome.slid:
+                kinds = [kind for kind in ('texture', 'roughness') if self.count_publishers(kind)]
+                end_s = time.monotonic() + self._estimate_timeout_s
+                while not (self._closing or estimates.final(kinds) or time.monotonic() > end_s):
+                    time.sleep(ESTIMATE_PERIOD_S)
         finally:
             del self._open[exploration.exploration_id]
         outcome = exploration.outcome
@@ -404,7 +324,14 @@ class ExplorerNode(PatientLifecycleNode):
             )
 
     def _log_end(self, exploration_id: str, outcome: ExplorationOutcome) -> None:
-        LOGGED[outcome.severity](self.get_logger(), outcome.sentence(exploration_id))
+        """Log how it ended: an abort is a warning, a finger that was not lifted an error."""
+        logger, sentence = self.get_logger(), outcome.sentence(exploration_id)
+        if outcome.success:
+            logger.info(sentence)
+        elif outcome.lifted:
+            logger.warning(sentence)
+        else:
+            logger.error(sentence)
 
     def _give_feedback(self, goal: Any, exploration: Exploration) -> None:
         """Publish feedback to the client; stop when it cancels."""
@@ -415,18 +342,13 @@ class ExplorerNode(PatientLifecycleNode):
             state = self._stamped(exploration.state)
             goal.publish_feedback(action.Explore.Feedback(state=to_msg(state), texture=to_msg(estimates.texture)))
 
-    def _wait_for_final_estimates(self, exploration: Exploration, estimates: ExplorationEstimates) -> None:
-        if exploration.outcome.slid and not self._closing:
-            kinds = [kind for kind in ('texture', 'roughness') if self.count_publishers(kind)]
-            estimates.wait_until_final(kinds, self._estimate_timeout_s)
-
     def _offer(self, name: str, work: Callable[[], str], group: ReentrantCallbackGroup) -> None:
         """Offer a service without arguments; `work` returns a message, or raises an error."""
 
         def answer(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             try:
                 response.message, response.success = work(), True
-            except (DeviceError, MotionRefused) as error:
+            except TextureError as error:
                 response.message = str(error)
             self.get_logger().info(f'{name[2:]}: {response.message}')
             return response
@@ -457,15 +379,19 @@ class ExplorerNode(PatientLifecycleNode):
         return f'{forgotten}; the surface stays as it is'
 
     def _on_estimate(self, message: msg.TextureEstimate | msg.RoughnessEstimate) -> None:
-        estimate: TextureEstimate | RoughnessEstimate = from_msg(message)
+        try:
+            estimate: TextureEstimate | RoughnessEstimate = from_msg(message)
+        except InvalidData as error:
+            self.get_logger().warning(f'an estimate was left out: {error}', throttle_duration_sec=1.0)
+            return
         estimates = self._open.get(estimate.exploration_id)
         if estimates is None:
             return
         estimates.update(estimate)
         current = self._explorer.current
-        wanted = current is not None and current.request.early_stopping
-        ours = current is not None and current.exploration_id == estimate.exploration_id
-        if wanted and ours and isinstance(estimate, TextureEstimate) and may_stop(estimate):
+        if current is None or current.exploration_id != estimate.exploration_id or not current.request.early_stopping:
+            return
+        if isinstance(estimate, TextureEstimate) and may_stop(estimate):
             current.finish(
                 f"ended early: '{estimate.label}' is decided with {estimate.confidence:.2f} "
                 f'after {estimate.windows} windows'
@@ -478,7 +404,7 @@ class ExplorerNode(PatientLifecycleNode):
     def _publish_idle(self) -> None:
         with self._publishing:
             if self._explorer.current is None:
-                idle = ExplorationState(self._explorer.now_ns(), '', '', Phase.IDLE, lifted=self._explorer.lifted)
+                idle = ExplorationState(self._explorer.clock(), '', '', Phase.IDLE, lifted=self._explorer.lifted)
                 self._publish(self._stamped(idle))
         self._publish_info()
 
@@ -505,14 +431,20 @@ class ExplorerNode(PatientLifecycleNode):
         return 'an exploration is running' if self._explorer.current else self._explorer.fault()
 
     def _broadcast_surface(self) -> None:
+        """Broadcast the pose of the surface in the base frame of the arm, if it has one."""
         arm = self._explorer.arm
-        if arm.base_frame_id:
-            self._frames.surface(arm.base_frame_id, arm.surface_pose)
+        if not arm.base_frame_id:
+            return
+        header = Header(stamp=self.get_clock().now().to_msg(), frame_id=arm.base_frame_id)
+        transform = TransformStamped(header=header, child_frame_id=self._surface_frame_id)
+        shift, turned = transform.transform.translation, transform.transform.rotation
+        shift.x, shift.y, shift.z = map(float, arm.surface_pose[:3])
+        turned.x, turned.y, turned.z, turned.w = quaternion(arm.surface_pose[3:])
+        self._transforms.publish(TFMessage(transforms=[transform]))
 
     def _publish(self, state: ExplorationState) -> None:
         try:
             self._states.publish(to_msg(state))
-            self._frames.fingertip(state)
         except RCLError:
             # After a shutdown of ROS there is no subscriber, but the finger still has to be lifted.
             if self.context.ok():
@@ -520,9 +452,9 @@ class ExplorerNode(PatientLifecycleNode):
 
     def _stamped(self, state: ExplorationState) -> ExplorationState:
         """Return the state with its stamp on the clock of ROS instead of CLOCK_MONOTONIC."""
-        age_ns = self._explorer.now_ns() - state.stamp_ns
+        age_ns = self._explorer.clock() - state.stamp_ns
         stamp_ns = self.get_clock().now().nanoseconds - age_ns
-        return replace(state, stamp_ns=stamp_ns, frame_id=self._frames.surface_frame_id)
+        return replace(state, stamp_ns=stamp_ns, frame_id=self._surface_frame_id)
 
     def _report(self) -> DiagnosticReport:
         current, fault = self._explorer.current, self._explorer.fault()
@@ -541,10 +473,6 @@ class ExplorerNode(PatientLifecycleNode):
             return 'ERROR', fault, numbers
         warning = self._explorer.arm.warning() or ('' if current else self._not_lifted)
         return ('WARN', warning, numbers) if warning else ('OK', 'the arm answers', numbers)
-
-
-def _accept_cancel(_goal: Any) -> CancelResponse:
-    return CancelResponse.ACCEPT
 
 
 def main() -> None:

@@ -11,17 +11,14 @@ by the guard. On other machines the ids of the publishers decide; rclpy has no e
 
 from __future__ import annotations
 
-import importlib
 import os
 import time
-from collections.abc import Sequence
 from typing import Any
 
 import rclpy
 from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
 from rclpy.context import Context
 from rclpy.duration import Duration
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
@@ -29,7 +26,7 @@ from rclpy.signals import SignalHandlerOptions
 from texture_core.errors import DeviceError
 from texture_core.ros import to_ns
 from texture_exploration.arms.arm import Vector, claim, give_up_when_ending
-from texture_exploration.arms.tool_state import HEARTBEAT_S, ForceSample, PoseSample, RosControllersParams
+from texture_exploration.arms.tool_state import ForceSample, PoseSample, RosControllersParams
 from texture_exploration.ros.guard import MEASURED_QOS, TwistGuard, ignore, newest, participant, scope, sender, stamped
 
 CONTROLLER_TOPICS_NODE = 'arm_topics'
@@ -68,13 +65,12 @@ class RosTopics:
             enable_rosout=False,
             start_parameter_services=False,
         )
-        wrench_topic = params.target_wrench_topic
-        self._commanded_topics = [node.resolve_topic_name(name) for name in (params.twist_topic, wrench_topic) if name]
+        self._topic = node.resolve_topic_name(params.twist_topic)
         self._lock = -1
         self._guard: TwistGuard | None = None
         self._looked_s, self._other = 0.0, ''
         try:
-            name = f'domain {self._context.get_domain_id()}, {self._commanded_topics[0]}'
+            name = f'domain {self._context.get_domain_id()}, {self._topic}'
             self._lock = claim(name, params.connect_timeout_s)
             self._participant = participant(node)
             self._wait_until_alone()
@@ -85,17 +81,14 @@ class RosTopics:
 
     def _open(self) -> None:
         """Make the publishers and subscriptions, and start the guard."""
-        params, node, wrench_topic = self._params, self._node, self._params.target_wrench_topic
+        params, node = self._params, self._node
         self._twists = node.create_publisher(TwistStamped, params.twist_topic, COMMAND_QOS)
-        self._wrenches = node.create_publisher(WrenchStamped, wrench_topic, COMMAND_QOS) if wrench_topic else None
         self._poses = node.create_subscription(PoseStamped, params.pose_topic, ignore, MEASURED_QOS)
         self._forces = node.create_subscription(WrenchStamped, params.wrench_topic, ignore, MEASURED_QOS)
         self._frame_id = params.twist_frame_id or params.base_frame_id
-        force_topic = (self._wrenches.topic_name, params.base_frame_id) if self._wrenches else ('', '')
-        topics = (self._twists.topic_name, self._frame_id, self._poses.topic_name, *force_topic)
-        patient = params.controller_timeout_s > 0.0
-        self._guard = TwistGuard(HEARTBEAT_S, node.get_namespace(), topics, patient=patient, lock=self._lock)
-        if not (patient or scope()):
+        topics = (self._twists.topic_name, self._frame_id, self._poses.topic_name)
+        self._guard = TwistGuard(node.get_namespace(), topics, self._lock)
+        if not (params.controller_timeout_s or scope()):
             node.get_logger().warning(f"'accept_shared_group' is true: {NO_SCOPE.format(topic=params.twist_topic)}")
 
     def newest_pose(self) -> PoseSample | None:
@@ -150,52 +143,10 @@ class RosTopics:
         linear.x, linear.y, linear.z = velocity_m_s
         self._twists.publish(message)
 
-    def send_force(self, force_n: Vector) -> None:
-        """Command a force of the tool on its surroundings in the base frame."""
-        if self._wrenches is None:
-            return
-        message = stamped(WrenchStamped, self._node, self._params.base_frame_id)
-        force = message.wrench.force
-        force.x, force.y, force.z = force_n
-        self._wrenches.publish(message)
-
-    def switch_controllers(self, activate: Sequence[str], deactivate: Sequence[str]) -> None:
-        """Let the controller manager switch both sets or nothing."""
-        manager = self._params.controller_manager
-        try:
-            kind = importlib.import_module('controller_manager_msgs.srv').SwitchController
-        except ImportError as error:
-            raise DeviceError(
-                f"parameter 'controller_manager' is '{manager}', which needs controller_manager_msgs; install it "
-                "(ros-jazzy-controller-manager-msgs), or set it to '' and switch the controllers by hand"
-            ) from error
-        request = kind.Request(activate_controllers=[*activate], deactivate_controllers=[*deactivate])
-        request.strictness = kind.Request.STRICT
-        answer = self._ask(kind, f'{manager}/switch_controller', request)
-        if answer is None or not answer.ok:
-            did = 'does not answer' if answer is None else f'refused: {getattr(answer, "message", "") or "see its log"}'
-            raise DeviceError(
-                f"'{manager}' was to activate {' '.join(activate)} instead of {' '.join(deactivate)}, and {did}"
-            )
-
-    def _ask(self, kind: Any, name: str, request: Any) -> Any:
-        """Return the answer of a service, None if none comes in time; the node is not spun meanwhile."""
-        client = self._node.create_client(kind, name)
-        executor = SingleThreadedExecutor(context=self._context)
-        try:
-            if not client.wait_for_service(self._params.connect_timeout_s):
-                return None
-            future = client.call_async(request)
-            rclpy.spin_until_future_complete(self._node, future, executor, self._params.connect_timeout_s)
-            return future.result() if future.done() else None
-        finally:
-            executor.shutdown()
-            self._node.destroy_client(client)
-
     def _wait_until_alone(self) -> None:
         """Return once the controller is found and has no other commander, which this check must not disturb."""
         begin_s, alone_s = time.monotonic(), 0.0
-        topic = self._commanded_topics[0]
+        topic = self._topic
         while True:
             give_up_when_ending()
             other, now_s = self._other_commander(self._participant), time.monotonic()
@@ -216,11 +167,10 @@ class RosTopics:
 
     def _other_commander(self, *ours: str) -> str:
         """Return in a sentence another commander, '' if there is none; `ours` are the participants of this explorer."""
-        for topic in self._commanded_topics:
-            for info in self._node.get_publishers_info_by_topic(topic):
-                if sender(info) not in ours:
-                    name = f'{info.node_namespace.rstrip("/")}/{info.node_name}'
-                    return f"'{name}' also commands the arm: it publishes on '{topic}'"
+        for info in self._node.get_publishers_info_by_topic(self._topic):
+            if sender(info) not in ours:
+                name = f'{info.node_namespace.rstrip("/")}/{info.node_name}'
+                return f"'{name}' also commands the arm: it publishes on '{self._topic}'"
         return ''
 
     def close(self) -> None:

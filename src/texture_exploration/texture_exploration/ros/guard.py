@@ -4,9 +4,9 @@
 
 A controller may keep executing the last velocity: the twist controller of `ur_robot_driver` has no timeout. The guard
 receives a heartbeat on a socket whose other end only the commanding process holds. If an arm that may still move is no
-longer commanded, as when that process hangs, is stopped (SIGSTOP) or frozen, it commands zero velocity, and zero force
-to a compliance controller; the kernel closes the socket at any end of the process, also by SIGKILL. It continues until
-the pose shows rest, and holds the lock of the arm until then.
+longer commanded, as when that process hangs, is stopped (SIGSTOP) or frozen, it commands zero velocity; the kernel
+closes the socket at any end of the process, also by SIGKILL. It continues until the pose shows rest, and holds the lock
+of the arm until then.
 """
 
 from __future__ import annotations
@@ -22,13 +22,14 @@ from collections.abc import Callable
 from typing import Any
 
 import rclpy
-from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
+from geometry_msgs.msg import PoseStamped, TwistStamped
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
 from texture_core.errors import DeviceError
 from texture_exploration.arms.arm import DONE, LEAVE_S, GuardProcess, RestWatch, guard_socket
+from texture_exploration.arms.tool_state import HEARTBEAT_S
 
 # --------------------
 # Messages to the controllers, and who sends them.
@@ -90,7 +91,7 @@ ANSWER_S = 0.05
 # Longest silence of a guard before it counts as hung. Next to two busy processes it was silent for more than 0.5 s
 # in two of eight runs; if the explorer also dies in that time, the timeout of the controller, where there is
 # one, and the limits of the robot remain. A guard that has ended is detected at once.
-SILENT_S = {True: 3.0, False: 1.5}  # with a controller that has a timeout, and with one that has none
+SILENT_S = 1.5
 GIVE_UP_S = 60.0  # without a pose that shows rest
 SCOPE = ('systemd-run', '--user', '--scope', '--quiet', '--collect')
 
@@ -107,16 +108,11 @@ def scope() -> tuple[str, ...]:
 class TwistGuard(GuardProcess):
     """The guard of one arm; no controller may be commanded that it does not reach, or once it has ended."""
 
-    def __init__(
-        self, heartbeat_s: float, namespace: str, topics: tuple[str, ...], *, patient: bool = False, lock: int = -1
-    ) -> None:
+    def __init__(self, namespace: str, topics: tuple[str, str, str], lock: int) -> None:
         # In a separate control group, if possible: what ends all processes of a service must not end the guard first.
-        holds = (lock,) if lock >= 0 else ()
-        super().__init__(__name__, str(heartbeat_s), namespace, *topics, start=scope(), holds=holds)
+        super().__init__(__name__, namespace, *topics, start=scope(), holds=(lock,))
         self.reached = 0  # subscribers that it has found; discovery takes a while and must precede a failure
         self.participant = ''
-        self.garbled = 0  # answers that could not be read
-        self._silent_s = SILENT_S[patient]
         self._heard_s = 0.0
         self._moving = False
 
@@ -124,19 +120,13 @@ class TwistGuard(GuardProcess):
         """Return in a sentence why the guard would not stop the arm, '' if it would or is still starting."""
         with contextlib.suppress(OSError):
             while answer := self.line.recv(4096):
-                reached, _, sender_of_guard = answer.decode('ascii', 'replace').partition(' ')
-                if not (reached.isdigit() and sender_of_guard):
-                    self.garbled += 1
-                    continue
-                self.reached, self.participant, self._heard_s = int(reached), sender_of_guard, time.monotonic()
+                reached, self.participant = answer.decode().split()
+                self.reached, self._heard_s = int(reached), time.monotonic()
         if self._process.poll() is not None:
             return 'the guard process, which would stop the arm if this process dies, has ended'
         silent_s = time.monotonic() - self._heard_s
-        if self._heard_s and silent_s > self._silent_s:
-            return (
-                f'the guard process, which would stop the arm if this process dies, is silent for {silent_s:.1f} s; '
-                f'{self.garbled} of its answers could not be read'
-            )
+        if self._heard_s and silent_s > SILENT_S:
+            return f'the guard process, which would stop the arm if this process dies, is silent for {silent_s:.1f} s'
         return ''
 
     def beat(self, *, moving: bool) -> None:
@@ -159,19 +149,16 @@ class TwistGuard(GuardProcess):
 
 def main() -> None:
     """Run as `python -m texture_exploration.ros.guard SOCKET …`, with what `TwistGuard` takes; it starts it."""
-    _, _, heartbeat_s, namespace, topic, frame_id, pose_topic, wrench_topic, wrench_frame_id = sys.argv
+    _, _, namespace, topic, frame_id, pose_topic = sys.argv
     line = guard_socket()
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node(TWIST_GUARD_NODE, namespace=namespace, enable_rosout=False, start_parameter_services=False)
     identity = participant(node)
     publisher = node.create_publisher(TwistStamped, topic, 1)
-    wrenches = node.create_publisher(WrenchStamped, wrench_topic, 1) if wrench_topic else None
     poses = node.create_subscription(PoseStamped, pose_topic, ignore, MEASURED_QOS)
 
     def command_standstill() -> None:
         publisher.publish(stamped(TwistStamped, node, frame_id))
-        if wrenches is not None:
-            wrenches.publish(stamped(WrenchStamped, node, wrench_frame_id))
 
     def take_pose(rest: RestWatch) -> None:
         pose = newest(poses)
@@ -184,14 +171,13 @@ def main() -> None:
             line.send(f'{publisher.get_subscription_count()} {identity}'.encode())
 
     line.setblocking(False)
-    guarded(line, float(heartbeat_s), command_standstill, take_pose, answer)
+    guarded(line, command_standstill, take_pose, answer)
     node.destroy_node()  # otherwise ROS shows it for 20 s as another commander
     rclpy.shutdown()
 
 
 def guarded(
     line: Any,
-    heartbeat_s: float,
     command_standstill: Callable[[], None],
     take_pose: Callable[[RestWatch], None],
     answer: Callable[[], None],
@@ -213,7 +199,7 @@ def guarded(
                 break
             moving, heard_s = received == MOVING, now_s
             rest.forget()
-        elif moving and now_s - heard_s > heartbeat_s and not rest.at_rest:
+        elif moving and now_s - heard_s > HEARTBEAT_S and not rest.at_rest:
             take_pose(rest)
             command_standstill()
         if now_s - answered_s > ANSWER_S:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from texture_core.config import param
 from texture_core.types import Array
 from texture_features.features.temporal import signal_differences
-from texture_features.windows import FLOOR, Feature, WindowBatch, mean_weights, power
+from texture_features.windows import FLOOR, Feature, WindowBatch, mean_weights, power, shared_constant
 
 # --------------------
 # Short spectra along a window: what the spectral features are made of.
@@ -73,11 +73,12 @@ def overlapping(rows: Array, length: int, step: int) -> Array:
     )
 
 
-def densities_of(windows: WindowBatch, segment: int, step: int, bins: int) -> Array:
-    """Return the densities of the segments of windows; features with equal parameters share them."""
+def quarter_densities(windows: WindowBatch, bands: int) -> Array:
+    """Return the densities of the segments of windows, a quarter of a segment apart; features share them."""
+    step = max(1, bands // 2)
     return windows.shared(
-        ('densities', segment, step, bins),
-        lambda: segment_densities(windows.centred_rows, windows.rate_hz, segment, step, bins),
+        ('densities', bands),
+        lambda: segment_densities(windows.centred_rows, windows.rate_hz, 2 * bands, step, bands),
     )
 
 
@@ -115,9 +116,7 @@ def amplitudes_of(windows: WindowBatch, points: int) -> tuple[Array, float]:
 @lru_cache(maxsize=64)
 def hann(length: int) -> Array:
     """Return a Hann window that is nowhere 0: taken in the middle of each sample."""
-    window: Array = np.sin(np.pi * (np.arange(length) + 0.5) / length) ** 2
-    window.flags.writeable = False
-    return window
+    return shared_constant(np.sin(np.pi * (np.arange(length) + 0.5) / length) ** 2)
 
 
 @lru_cache(maxsize=64)
@@ -134,9 +133,7 @@ def _transform(length: int, segment: int, bins: int, rate_hz: float) -> Array:
     # The bins count for both signs of frequency, but for the one at half the sampling rate, which has no other.
     scale = np.full(bins, 2.0 / (rate_hz * float(taper @ taper)))
     scale[segment // 2 - 1 :] /= 2.0
-    matrix: Array = np.ascontiguousarray((waves * np.sqrt(np.tile(scale, 2))).T)
-    matrix.flags.writeable = False
-    return matrix
+    return shared_constant(np.ascontiguousarray((waves * np.sqrt(np.tile(scale, 2))).T))
 
 
 # --------------------
@@ -164,11 +161,6 @@ def spatial_log_bands(windows: WindowBatch, edges_per_m: Array, floor: float) ->
     # The same power on a stretch that is narrower by the speed: unit²/Hz · m/s = unit² m.
     logarithm: Array = np.log(per_hz * scale + floor)
     return np.where(moving[..., None, None], logarithm, np.nan)
-
-
-def mean_subtracted(log_bands: Array) -> Array:
-    """Return log bands less their mean over the bands: how hard and how fast the finger presses is mostly level."""
-    return log_bands - np.add.reduce(log_bands, axis=-1, keepdims=True) / log_bands.shape[-1]
 
 
 def _mean_between(density: Array, edges: Array) -> Array:
@@ -233,11 +225,8 @@ def at_reference_speed(hertz: Array, windows: WindowBatch, speed_m_s: float) -> 
 @lru_cache(maxsize=64)
 def _lines(segment: int, rate_hz: float) -> tuple[Array, Array]:
     """Return the frequency of each line, (segment / 2,) Hz, and the fraction of its density that its integral has."""
-    hertz: Array = np.arange(1, segment // 2 + 1, dtype=np.float64) * (rate_hz / segment)
-    integration: Array = 1.0 / (2.0 * np.pi * hertz) ** 2
-    for array in (hertz, integration):
-        array.flags.writeable = False
-    return hertz, integration
+    hertz = shared_constant(np.arange(1, segment // 2 + 1, dtype=np.float64) * (rate_hz / segment))
+    return hertz, shared_constant(1.0 / (2.0 * np.pi * hertz) ** 2)
 
 
 # --------------------
@@ -263,14 +252,9 @@ class LogBands(Feature):
         """Number of the band, from 1."""
         return tuple(str(band + 1) for band in range(self.bands))
 
-    @cached_property
-    def _step(self) -> int:
-        return max(1, self.bands // 2)  # a quarter of a segment
-
     def __call__(self, windows: WindowBatch) -> Array:
         """Return log(mean density + floor)."""
-        densities = densities_of(windows, 2 * self.bands, self._step, self.bands)
-        return np.log(mean_over_segments(densities) + FLOOR)
+        return np.log(mean_over_segments(quarter_densities(windows, self.bands)) + FLOOR)
 
 
 # --------------------
@@ -338,8 +322,7 @@ class MeanLogBands(LogBands):
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the mean of log(density + floor)."""
-        densities = densities_of(windows, 2 * self.bands, self._step, self.bands)
-        logs = densities + FLOOR
+        logs = quarter_densities(windows, self.bands) + FLOOR
         return mean_over_segments(np.log(logs, out=logs))
 
 
@@ -480,54 +463,6 @@ class PowerAutocorrelation(Feature):
             (products + POWER_AUTOCORRELATION_TINY) / (mean * mean + POWER_AUTOCORRELATION_TINY) + LEAST_RATIO
         )
         return autocorrelations.reshape(*powers.shape[:-2], -1)
-
-
-# --------------------
-# How the power in frequency bands changes over the window.
-
-
-@dataclass(frozen=True)
-class ShortTimeFourier(Feature):
-    """Logarithm of the power spectral density in equal bands, for each of some equal parts of the window.
-
-    The short-time Fourier transform, averaged within each part. Where a window has fewer segments than parts,
-    neighbouring parts share one.
-
-    Examples
-    --------
-    >>> time_s = np.arange(1000) / 1000.0
-    >>> chirp = np.where(time_s < 0.5, np.sin(2 * np.pi * 100.0 * time_s), np.sin(2 * np.pi * 300.0 * time_s))[:, None]
-    >>> feature = ShortTimeFourier(parts=2, bands=10)  # bands at 50, 100, … 500 Hz
-    >>> values = feature(WindowBatch(chirp, rate_hz=1000.0)).reshape(2, 10)
-    >>> (values.argmax(axis=1) + 1).tolist()
-    [2, 6]
-    """
-
-    parts: int = param(4, 'Number of equal time segments of the window.', low=1, high=256)
-    bands: int = param(16, 'Number of frequency bands; a segment is twice as many samples long.', low=2, high=512)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Part and band, each from 1."""
-        return tuple(f'{part + 1}/{band + 1}' for part in range(self.parts) for band in range(self.bands))
-
-    def __call__(self, windows: WindowBatch) -> Array:
-        """Return log(mean density of each part + floor), part by part."""
-        densities = densities_of(windows, 2 * self.bands, self.bands, self.bands)  # segments overlap by half
-        means = _averaging(self.parts, densities.shape[-2]) @ densities
-        return np.log(means + FLOOR).reshape(*means.shape[:-2], -1)
-
-
-@lru_cache(maxsize=64)
-def _averaging(parts: int, segments: int) -> Array:
-    """Return the matrix (parts, segments) whose product with segments is the mean of each part."""
-    first = np.arange(parts) * segments // parts
-    last = np.maximum(np.arange(1, parts + 1) * segments // parts, first + 1)
-    index = np.arange(segments)
-    belongs = ((index >= first[:, None]) & (index < last[:, None])).astype(np.float64)
-    matrix: Array = belongs / belongs.sum(axis=1, keepdims=True)
-    matrix.flags.writeable = False
-    return matrix
 
 
 # --------------------

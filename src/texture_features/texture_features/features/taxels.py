@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Features of arrays of taxels: spatial bands and variation, shares, correlation."""
+"""Features of arrays of taxels: spatial bands and variation, means over taxels, correlation."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -13,50 +13,8 @@ import numpy as np
 from texture_core.config import param
 from texture_core.errors import InvalidParameter
 from texture_core.types import Array
-from texture_features.features.spectral import (
-    WelchPower,
-    mean_subtracted,
-    spatial_log_bands,
-    welch_spectrum,
-)
-from texture_features.windows import FLOOR, Feature, WindowBatch, centred, first_difference, floor_param, power
-
-# --------------------
-# Log shares: how the load is distributed over the taxels, with its sign.
-
-FREE_FRACTION = 0.01  # of the load, below which a channel counts as free: only noise
-
-
-@dataclass(frozen=True)
-class LogShares(Feature):
-    """Signed logarithm of each channel's share of the total load, less the mean of these logarithms.
-
-    The share s of a channel is its mean over the sum of the absolute means. Each gives sign(s) · log(max(|s|, 0.01) /
-    0.01): a taxel that carries nearly nothing gives 0, not its noise. Where no level is negative these are the
-    centred log-ratios of Aitchison 1986 with a floor that follows the load. A force that presses all taxels harder by
-    the same factor changes nothing.
-
-    Examples
-    --------
-    >>> levels = np.array([[3.0, -1.0, 0.0]])  # pressed, pulled, and free
-    >>> shares = LogShares()(WindowBatch(levels, rate_hz=100.0))[:, 0]
-    >>> (shares - shares[2]).round(2).tolist()  # log 75, -log 25, 0
-    [4.32, -3.22, 0.0]
-    >>> np.allclose(LogShares()(WindowBatch(10 * levels, 100.0)), LogShares()(WindowBatch(levels, 100.0)))
-    True
-    """
-
-    def __call__(self, windows: WindowBatch) -> Array:
-        """Return the signed log shares."""
-        rows = windows.rows
-        levels = np.add.reduce(rows, axis=-1) / rows.shape[-1]
-        sizes = np.abs(levels)
-        total = np.add.reduce(sizes, axis=-1, keepdims=True)
-        fractions = np.divide(sizes, total, out=np.zeros_like(sizes), where=total > 0.0)
-        logs = np.sign(levels) * np.log(np.maximum(fractions, FREE_FRACTION) / FREE_FRACTION)
-        centred: Array = logs - np.add.reduce(logs, axis=-1, keepdims=True) / logs.shape[-1]
-        return centred[..., None]
-
+from texture_features.features.spectral import WelchPower, spatial_log_bands, welch_spectrum
+from texture_features.windows import FLOOR, Feature, WindowBatch, centred, floor_param, power
 
 # --------------------
 # Mean, power and shape statistics of the signal, averaged over the channels.
@@ -100,40 +58,6 @@ class ChannelMeanStatistics(Feature):
         skewness = cubes / (variance + LEAST_VARIANCE) ** 1.5
         values = np.stack([level, np.log(variance + LEAST_VARIANCE), rise, np.abs(rise), above, skewness], axis=-1)
         return np.add.reduce(values, axis=-2, keepdims=True) / values.shape[-2]
-
-
-# --------------------
-# Relative changes: how much each taxel changes within a window, over the load of all.
-
-LEAST_LOAD = 1e-9  # in the unit of the signal, by which is divided
-
-
-@dataclass(frozen=True)
-class RelativeChanges(Feature):
-    """Square roots of each channel's standard deviation and of that of its steps, over the load of all channels.
-
-    Two moments of the slow spectrum (Hjorth's activity, and that of the slope) without the level: the deviation counts
-    slow changes, the steps fast ones. The load is the sum of the absolute means; a force that presses harder, and lets
-    all change by the same factor, changes nothing.
-
-    Examples
-    --------
-    >>> samples = np.array([[1.0, 9.0], [3.0, 9.0], [1.0, 9.0], [3.0, 9.0]])  # one taxel moves by ±1 under a load of 11
-    >>> RelativeChanges()(WindowBatch(samples, rate_hz=100.0)).round(3).tolist()
-    [[0.302, 0.414], [0.0, 0.0]]
-    """
-
-    per_channel: ClassVar[bool] = True
-    names: ClassVar[tuple[str, ...]] = ('deviation', 'step')
-
-    def __call__(self, windows: WindowBatch) -> Array:
-        """Return both roots."""
-        rows = windows.rows
-        load = np.add.reduce(np.abs(np.add.reduce(rows, axis=-1) / rows.shape[-1]), axis=-1, keepdims=True)
-        steps = first_difference(rows)
-        steps = steps - np.add.reduce(steps, axis=-1, keepdims=True) / steps.shape[-1]
-        deviations = np.sqrt(np.stack([power(windows.centred_rows), power(steps)], axis=-1))
-        return np.sqrt(deviations / np.maximum(load, LEAST_LOAD)[..., None])
 
 
 # --------------------
@@ -239,8 +163,33 @@ class LoadLevel(Feature):
 MIN_LINES = 1e-3
 
 
+class OctaveBands:
+    """Bands of waves per metre between the longest and the shortest wave, equally wide in octaves."""
+
+    bands: int
+    longest_m: float
+    shortest_m: float
+
+    def __post_init__(self) -> None:
+        if not self.shortest_m < self.longest_m:
+            raise InvalidParameter(
+                f'waves from {self.shortest_m} m to {self.longest_m} m came; the longest must be longer'
+            )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Number of the band, from 1."""
+        return tuple(str(band + 1) for band in range(self.bands))
+
+    @cached_property
+    def edges_per_m(self) -> Array:
+        """The edges of the bands, waves per metre, (bands + 1,)."""
+        edges = np.geomspace(1.0 / self.longest_m, 1.0 / self.shortest_m, self.bands + 1)
+        return np.asarray(edges, dtype=np.float64)
+
+
 @dataclass(frozen=True)
-class SpatialBandPower(WelchPower):
+class SpatialBandPower(OctaveBands, WelchPower):
     """Logarithm of the mean density in bands of waves per metre, f / speed; longest waves first.
 
     Bands are equally wide in octaves. Choose waves that the sensor reaches at every speed: from v / high_hz to
@@ -264,26 +213,15 @@ class SpatialBandPower(WelchPower):
         4.5e-4, 'Shortest wavelength, which is the upper edge of the last band.', unit='m', low=1e-6, high=1.0
     )
 
-    def __post_init__(self) -> None:
-        if not self.shortest_m < self.longest_m:
-            raise InvalidParameter(
-                f'waves from {self.shortest_m} m to {self.longest_m} m came; the longest must be longer'
-            )
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Number of the band, from 1."""
-        return tuple(str(band + 1) for band in range(self.bands))
-
     def __call__(self, windows: WindowBatch) -> Array:
         """Return log(mean density + floor) of each band."""
         densities, hertz = welch_spectrum(windows, self.points, self.rate_of_change)
         speed = windows.moving_m_s[..., None, None, None]
         # Line n, from 0, covers the stretch from n to n + 1; edges are also in lines.
-        edges = _edges_1_m(self) * (speed / hertz[0]) - 0.5
+        edges = self.edges_per_m[:, None] * (speed / hertz[0]) - 0.5
         low = np.minimum(np.maximum(edges[..., :-1, :], 0.0), len(hertz) - 1.0)
         high = np.minimum(np.maximum(edges[..., 1:, :], low + MIN_LINES), len(hertz))
-        line = _numbers(len(hertz) + 1)
+        line = np.arange(len(hertz) + 1.0)
         inside = np.minimum(np.maximum(line, low), high)
         fraction = inside[..., 1:] - inside[..., :-1]
         mean = np.add.reduce(fraction * densities[..., None, :], axis=-1) / (high - low)[..., 0]
@@ -291,46 +229,30 @@ class SpatialBandPower(WelchPower):
         return np.log(mean * speed[..., 0] + FLOOR)
 
 
-@lru_cache(maxsize=64)
-def _numbers(count: int) -> Array:
-    numbers = np.arange(count, dtype=np.float64)
-    numbers.flags.writeable = False
-    return numbers
-
-
-@lru_cache(maxsize=64)
-def _edges_1_m(feature: SpatialBandPower) -> Array:
-    """Return the edges of the bands in waves per metre, (bands + 1, 1)."""
-    edges: Array = np.asarray(
-        np.geomspace(1.0 / feature.longest_m, 1.0 / feature.shortest_m, feature.bands + 1), dtype=np.float64
-    )[:, None]
-    edges.flags.writeable = False
-    return edges
-
-
 # --------------------
-# Power in bands of spatial frequency, channel by channel.
+# Power in bands of spatial frequency: the mean over the channels.
 
 
 @dataclass(frozen=True)
-class SpatialBands(Feature):
-    """Logarithm of the mean density in bands of waves per metre, f / speed; longest waves first.
+class MeanSpatialBands(OctaveBands, Feature):
+    """Mean over the channels of the log mean density in bands of waves per metre, f / speed; longest waves first.
 
     Bands are equally wide in octaves, over the whole window: a grating of pitch λ is in the band of 1/λ whatever
     the speed. Choose waves that the sensor reaches at every speed v: none shorter than 2 v / rate. Which channel
-    may depend on how a surface was mounted; `mean_spatial_bands` does not. NaN if the speed is
-    unknown or 0.
+    measured what is lost, as that depends on how a surface was mounted. NaN if the speed is unknown or 0.
 
     Examples
     --------
     >>> def slide(speed_m_s: float) -> WindowBatch:  # over a grating with a pitch of 2 mm
     ...     wave = np.sin(2 * np.pi * speed_m_s / 2e-3 * np.arange(1000) / 1000.0)
     ...     return WindowBatch(wave[:, None], 1000.0, np.array(speed_m_s))
-    >>> feature = SpatialBands(bands=8)
+    >>> feature = MeanSpatialBands(bands=8)
     >>> strongest = [int(feature(slide(speed_m_s)).argmax()) for speed_m_s in (0.05, 0.1)]
     >>> [bool(feature.edges_per_m[band] < 500.0 < feature.edges_per_m[band + 1]) for band in strongest]
     [True, True]
     """
+
+    per_channel: ClassVar[bool] = False
 
     bands: int = param(32, 'Number of spatial frequency bands.', low=2, high=512)
     longest_m: float = param(
@@ -342,50 +264,11 @@ class SpatialBands(Feature):
     normalised: bool = param(True, 'Subtracts the mean over the bands, which depends mainly on force and speed.')
     floor: float = floor_param('Spatial power density', 'unit² m', 1e-7)
 
-    def __post_init__(self) -> None:
-        if not self.shortest_m < self.longest_m:
-            raise InvalidParameter(
-                f'spatial bands have waves from {self.shortest_m} m to {self.longest_m} m; the longest must be longer'
-            )
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Number of the band, from 1."""
-        return tuple(str(band + 1) for band in range(self.bands))
-
-    @property
-    def edges_per_m(self) -> Array:
-        """The edges of the bands, waves per metre, (bands + 1,)."""
-        edges = np.geomspace(1.0 / self.longest_m, 1.0 / self.shortest_m, self.bands + 1)
-        return np.asarray(edges, dtype=np.float64)
-
     def __call__(self, windows: WindowBatch) -> Array:
-        """Return log(mean density + floor) of each band."""
+        """Return the mean over the channels of log(mean density + floor) of each band."""
         bands = spatial_log_bands(windows, self.edges_per_m, self.floor)
-        return mean_subtracted(bands) if self.normalised else bands
-
-
-# --------------------
-# Power in bands of spatial frequency: the mean over the channels.
-
-
-@dataclass(frozen=True)
-class MeanSpatialBands(SpatialBands):
-    """Mean over the channels of `spatial_bands`, independent of the taxel. NaN if the speed is unknown.
-
-    Examples
-    --------
-    >>> samples = np.random.default_rng(0).standard_normal((500, 4))
-    >>> both = [WindowBatch(each, 1000.0, np.array(0.05)) for each in (samples, samples[:, ::-1])]
-    >>> np.allclose(MeanSpatialBands()(both[0]), MeanSpatialBands()(both[1]))  # which taxel measured what is lost
-    True
-    """
-
-    per_channel: ClassVar[bool] = False
-
-    def __call__(self, windows: WindowBatch) -> Array:
-        """Return the mean over the channels of the log bands."""
-        bands = SpatialBands.__call__(self, windows)
+        if self.normalised:
+            bands = bands - np.add.reduce(bands, axis=-1, keepdims=True) / bands.shape[-1]
         return np.add.reduce(bands, axis=-2, keepdims=True) / bands.shape[-2]
 
 

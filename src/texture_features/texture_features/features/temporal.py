@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -108,8 +107,8 @@ class Hjorth(Feature):
     --------
     >>> time_s = np.arange(1000) / 1000.0
     >>> tone = WindowBatch(np.sin(2 * np.pi * 40.0 * time_s)[:, None], rate_hz=1000.0)
-    >>> Hjorth(log_activity=False)(tone)[0, :2].round(2).tolist()  # ½, and 2 sin(π · 40 / 1000)
-    [0.5, 0.25]
+    >>> Hjorth(log_activity=False)(tone)[0].round(2).tolist()  # ½, 2 sin(π · 40 / 1000), and 1 of a tone
+    [0.5, 0.25, 1.0]
     """
 
     log_activity: bool = param(True, 'Returns the logarithm of the activity instead of the activity itself.')
@@ -352,21 +351,16 @@ class Stretched(Feature):
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the values of the feature."""
-        parts = list(self._parts(windows))
+        groups = windows.shared(('stretched', self.to_m_s), lambda: self._cut(windows))
+        parts = list(groups.values())
         extracted = [self.feature(part) for _, part in parts]
         values = np.empty((*windows.samples.shape[:-2], *extracted[0].shape[-2:]))
         for (chosen, _), block in zip(parts, extracted, strict=True):
             values[chosen] = block
         return values
 
-    def _parts(self, windows: WindowBatch) -> Iterator[tuple[AnyArray, WindowBatch]]:
-        """Yield the windows in groups of one stretched length, each with where it comes from."""
-        known: dict[int, tuple[AnyArray, WindowBatch]] = windows.shared(
-            ('stretched', self.to_m_s), lambda: self._cut(windows)
-        )
-        yield from known.values()
-
     def _cut(self, windows: WindowBatch) -> dict[int, tuple[AnyArray, WindowBatch]]:
+        """Return the windows in groups of one stretched length, each with where it comes from."""
         leading = windows.samples.shape[:-2]
         speed, force = (np.broadcast_to(values, leading) for values in (windows.speed_m_s, windows.force_n))
         lengths = stretched_lengths(speed, windows.samples.shape[-2], self.to_m_s)

@@ -8,6 +8,7 @@ import argparse
 import re
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 from texture_core.cli import Command, add_parameters, add_slides, parameters_from, task
 from texture_core.config import find
@@ -30,44 +31,22 @@ def _configure_import(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         'places', nargs='+', metavar='PLACE', help='the mapping file, if there is one; the source; the folder for bags'
     )
-    parser.add_argument(
-        '--materials', nargs='+', default=(), metavar='NAME', help='only these surfaces; all if not given'
-    )
-    add_slides(parser)
     parser.add_argument('--dry-run', action='store_true', help='only print what a mapping would import; no OUT')
 
 
 def _import(options: argparse.Namespace) -> int:
     """Import, and name the bags."""
     mapped = options.data_set in MAPPED
-    if not mapped:
-        find({**IMPORTS, **MAPPED}, options.data_set, 'data set or kind of source')
+    importer: Any = find({**IMPORTS, **MAPPED}, options.data_set, 'data set or kind of source')
     if options.dry_run and mapped and len(options.places) == 2:
         options.places.append('')
     if len(options.places) != 2 + mapped:
         raise InvalidParameter(f'{len(options.places)} places were given after {options.data_set}; write {USAGE}')
-    if mapped and (options.slides or options.materials):
-        raise InvalidParameter(
-            f'--slides and --materials choose from a known data set; of {options.data_set} the mapping '
-            'file says what is read'
-        )
     if options.dry_run and not mapped:
         raise InvalidParameter(f'--dry-run prints what a mapping means; {options.data_set} has none, leave it out')
-    for bag in _import_mapped(options) if mapped else _import_known(options):
+    for bag in _import_mapped(options) if mapped else importer(*options.places):
         print(bag)
     return 0
-
-
-def source_folder(source: str, data_set: str) -> Path:
-    """Return the given folder of a data set, or its subfolder that has the name of the data set."""
-    inside = Path(source) / data_set
-    return inside if inside.is_dir() else Path(source)
-
-
-def _import_known(options: argparse.Namespace) -> list[Path]:
-    importer = find(IMPORTS, options.data_set, 'data set')
-    source, out = options.places
-    return importer(source_folder(source, options.data_set), out, options.slides, options.materials)
 
 
 def _import_mapped(options: argparse.Namespace) -> list[Path]:

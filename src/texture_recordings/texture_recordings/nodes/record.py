@@ -7,17 +7,13 @@ from __future__ import annotations
 import queue
 import threading
 import time
-from collections import Counter, defaultdict
+from collections import Counter
 from dataclasses import dataclass
 from typing import Any
 
-from rcl_interfaces.msg import Parameter, ParameterEvent
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.serialization import serialize_message
-from rclpy.task import Future
 
 from texture_core.config import param
 from texture_core.errors import InvalidData, InvalidParameter
@@ -30,8 +26,6 @@ QUEUE = 20_000  # a minute of one finger: a disk that stalls longer loses messag
 POLL_S = 0.2
 FLUSH_S = 1.0  # what a killed recorder, a failing supply or a full disk may take
 NOTHING = RawMessage('', '', 0, b'')
-EVENTS, EVENT = '/parameter_events', 'rcl_interfaces/msg/ParameterEvent'
-HEADER = 4  # bytes of the encoding of a message
 DISCOVERY_S = 0.5  # period of the search for other topics
 
 
@@ -48,7 +42,7 @@ class RecordParams:
 class RecordNode(Node):
     """Write the topics of the suite's messages, in its namespace and below it, to a bag, with their times of arrival.
 
-    Also `/diagnostics`, `/rosout`, `/tf_static` and `/parameter_events`, and there, once, what the parameters are.
+    Also `/diagnostics`, `/rosout`, `/tf_static` and `/parameter_events`.
     """
 
     def __init__(self) -> None:
@@ -66,8 +60,6 @@ class RecordNode(Node):
         self._writer.start()
         self._namespace = self.get_namespace().rstrip('/')
         self._seen: set[str] = set()  # topics that are recorded, or whose omission was logged
-        self._askers: dict[str, AsyncParameterClient] = {}  # of the nodes whose parameters are noted
-        self._asked: defaultdict[str, bool] = defaultdict(bool)
         for topic in TOPICS.values():
             self._subscribe(self.resolve_topic_name(topic.name), topic.msgtype, topic.qos)
         self._diagnostics = Diagnostics(self, self._report)
@@ -89,7 +81,7 @@ class RecordNode(Node):
             self._diagnostics.end()
 
     def _find_more(self) -> None:
-        """Subscribe to what has appeared, and note the parameters of nodes that have."""
+        """Subscribe to what has appeared."""
         for name, types in self.get_topic_names_and_types():
             ours = name.startswith(f'{self._namespace}/') and (self._all or types[0] in MESSAGES)
             if name not in self._seen and (ours or name in COMMON):
@@ -99,10 +91,6 @@ class RecordNode(Node):
                 elif publishers := self.get_publishers_info_by_topic(name):
                     # Not before: who only listens does not tell what is offered, and a wrong wish gets nothing.
                     self._subscribe(name, types[0], publishers[0].qos_profile)
-        for name, namespace in self.get_node_names_and_namespaces():
-            node = f'{namespace.rstrip("/")}/{name}'
-            if node.startswith(f'{self._namespace}/') and node != self.get_fully_qualified_name():
-                self._note_parameters(node)
 
     def _subscribe(self, name: str, msgtype: str, offered: QoSProfile) -> None:
         self._seen.add(name)
@@ -119,30 +107,6 @@ class RecordNode(Node):
         self.create_subscription(kind, name, lambda raw: self._on_message(name, msgtype, raw), qos, raw=True)
         if name not in TOPICS:
             self.get_logger().info(f"recording '{name}'")
-
-    def _note_parameters(self, node: str) -> None:
-        """Get all parameters of a node once, and write them as a parameter event."""
-        client = self._askers.get(node)
-        if client is None:
-            client = self._askers[node] = AsyncParameterClient(self, node)
-        elif not self._asked[node] and client.services_are_ready():
-            self._asked[node] = True
-
-            def write(values: Future, names: list[str]) -> None:
-                pairs = zip(names, values.result().values, strict=True)
-                event = ParameterEvent(node=node, stamp=self.get_clock().now().to_msg())
-                event.new_parameters = [Parameter(name=name, value=value) for name, value in pairs]
-                # As it is published: behind the message, rclpy leaves up to 8 bytes that were never set for each value,
-                # at which readers stop. They estimate the length with padding for empty arrays, which is not written.
-                raw, definition = serialize_message(event), typestore().get_msgdef(EVENT)
-                _, end = definition.deserialize_cdr_le(raw[HEADER:], 0, definition.cls, typestore())
-                self._on_message(EVENTS, EVENT, raw[: HEADER + end])
-
-            def ask(listed: Future) -> None:
-                names = list(listed.result().result.names)
-                client.get_parameters(names).add_done_callback(lambda values: write(values, names))
-
-            client.list_parameters([], 10).add_done_callback(ask)
 
     def _on_message(self, name: str, msgtype: str, raw: bytes) -> None:
         message = RawMessage(name, msgtype, self.get_clock().now().nanoseconds, raw)

@@ -30,19 +30,21 @@ from texture_recordings.slides import find_slides
 # When each message of a recording is due in a replay.
 
 
+LONGEST_PAUSE_NS = NANOSECONDS  # longer ones are shortened to it
+
+
 class Schedule:
     """Turn log times, given in their order, into seconds since the replay began."""
 
-    def __init__(self, rate: float, longest_pause_s: float) -> None:
+    def __init__(self, rate: float) -> None:
         self._rate = rate
-        self._longest_ns = round(longest_pause_s * NANOSECONDS)
         self._last_ns: int | None = None
         self._played_ns = 0
 
     def due_s(self, log_ns: int) -> float:
         """Return when the message logged at `log_ns` is due."""
         if self._last_ns is not None:
-            self._played_ns += min(max(log_ns - self._last_ns, 0), self._longest_ns)
+            self._played_ns += min(max(log_ns - self._last_ns, 0), LONGEST_PAUSE_NS)
         self._last_ns = log_ns
         return self._played_ns / self._rate / NANOSECONDS
 
@@ -67,9 +69,6 @@ class ReplayParams:
     rate: float = param(1.0, 'Playback rate relative to the recording; 2 is twice as fast.', low=0.01, high=1000.0)
     slides: str = param('', "Which slides of each surface are published, such as '1-30'; '' takes the whole recording.")
     from_namespace: str = param('', "Namespace in the bag to publish; '' if it has but one.")
-    longest_pause_s: float = param(
-        1.0, 'Longest pause that is replayed; longer ones are shortened to it.', unit='s', low=0.0
-    )
     subscribers: int = param(
         1,
         "Number of subscribers that 'signal', 'exploration' and 'features' need before the start.",
@@ -193,7 +192,7 @@ class ReplayNode(Node):
         return {'signal': signal, 'exploration': counts['exploration'], 'features': self.count_subscribers('features')}
 
     def _publish_all(self) -> None:
-        schedule = Schedule(self._params.rate, self._params.longest_pause_s)
+        schedule = Schedule(self._params.rate)
         start, latest_s = time.monotonic(), 0.0
         for name, message in self._messages:
             if name not in self._outputs:

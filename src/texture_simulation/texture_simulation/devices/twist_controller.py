@@ -135,7 +135,6 @@ STEP_NS = 1_000_000
 MAX_STEPS = 100  # in one go, after the machine was busy
 GRAVITY_M_S2 = 9.81
 TOOL_DOWN = (1.0, 0.0, 0.0, 0.0)  # quaternion x, y, z, w: the tool's z axis points against that of the base
-COMPLIANCE_M_S_N = 0.002  # speed per force error with which the arm yields; a guess of a usual order
 TOOL_AXES = np.diag([1.0, -1.0, -1.0])
 
 
@@ -151,7 +150,6 @@ class EmulatedTwistArm:
         self.velocity: Array = np.zeros(3)
         self._coming: deque[tuple[int, Array]] = deque()
         self._wanted: Array = np.zeros(3)
-        self._pressing: Array = np.zeros(3)
         self._since_ns = self._now_ns = now_ns
 
     def command(self, now_ns: int, velocity_m_s: Array) -> None:
@@ -160,10 +158,6 @@ class EmulatedTwistArm:
             delay_s = self.params.lag_s + self.jitter_s()
             sign = -1.0 if self.params.invert_twist else 1.0
             self._coming.append((now_ns + round(delay_s * 1e9), sign * velocity_m_s))
-
-    def press(self, force_n: Array) -> None:
-        """Take the force of the tool on its surroundings, (3,), N, to which the arm yields from now on; 0: none."""
-        self._pressing = force_n
 
     def jitter_s(self) -> float:
         """Return a random delay."""
@@ -205,17 +199,9 @@ class EmulatedTwistArm:
             self._since_ns, self._wanted = self._coming.popleft()
         if params.command_timeout_s and self._now_ns - self._since_ns > params.command_timeout_s * 1e9:
             self._wanted = np.zeros(3)
-        wanted = self._wanted + self._yielding()
+        wanted = self._wanted
         speed = math.sqrt(float(wanted @ wanted))
         if speed > params.max_speed_m_s:
             wanted = wanted * (params.max_speed_m_s / speed)
         self.velocity = approach(self.velocity, wanted, params.max_acceleration_m_s2 * dt_s)
         self.position = self.position + self.velocity * dt_s
-
-    def _yielding(self) -> Array:
-        """Return the velocity with which the arm presses as commanded, along the commanded force."""
-        size = math.sqrt(float(self._pressing @ self._pressing))
-        if size == 0.0:
-            return np.zeros(3)
-        direction = self._pressing / size
-        return COMPLIANCE_M_S_N * (size + float(self.force_n @ direction)) * direction

@@ -31,7 +31,6 @@ class ControllerTopicParams(FingerPipeParams):
     """Names of the topics and frames, which are those of `ur_robot_driver` by default."""
 
     twist_topic: str = param('twist_controller/twist', 'Topic of the commanded velocities.')
-    target_wrench_topic: str = param('target_wrench', 'Topic of the commanded force.')
     pose_topic: str = param('tcp_pose_broadcaster/pose', 'Topic of the measured pose.')
     wrench_topic: str = param('force_torque_sensor_broadcaster/wrench', 'Topic of the measured force.')
     base_frame_id: str = param('base', 'Name of the base frame; commands in other frames are ignored.')
@@ -81,7 +80,6 @@ class TwistControllerNode(Node):
         self._true_wrenches = self.create_publisher(WrenchStamped, 'true_wrench', 100)
         self._delayed: deque[tuple[float, Any, list[float]]] = deque()  # when due, stamp and reading
         self._twists = self.create_subscription(TwistStamped, topics.twist_topic, self._on_twist, 1)
-        self.create_subscription(WrenchStamped, topics.target_wrench_topic, self._on_wrench, 1)
         self._emulator = FingerSender(topics.finger_pipe)
         self._closing = threading.Event()
         Diagnostics(self, self._report)
@@ -121,11 +119,6 @@ class TwistControllerNode(Node):
         linear = message.twist.linear
         with self._lock:
             self._arm.command(time.monotonic_ns(), np.array([linear.x, linear.y, linear.z]))
-
-    def _on_wrench(self, message: WrenchStamped) -> None:
-        force = message.wrench.force
-        with self._lock:
-            self._arm.press(np.array([force.x, force.y, force.z]))
 
     def _run(self) -> None:
         period_s = 1.0 / self._topics.rate_hz

@@ -1,9 +1,8 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""An arm behind a controller manager, for an explorer in a process of its own: `arm:=managed_arm:ManagedArm`.
+"""An arm behind emulated topics, for an explorer in a separate process: `arm:=logged_arm:LoggedArm`.
 
-The topics and the manager are emulated within the process, as the wheels of ROS lack the messages of the manager. Each
-switch is appended to the file MANAGED_LOG, with the height of the finger and whether rest was commanded last.
+When it is released, the height of the finger, and whether rest was commanded last, are written to the file LOGGED_ARM.
 """
 
 from __future__ import annotations
@@ -20,12 +19,12 @@ from texture_exploration.arms.tool_state import ForceSample, PoseSample, RosCont
 from texture_simulation.devices.twist_controller import TOOL_DOWN, EmulatedTwistArm, TwistControllerParams
 
 
-class ManagedTopics:
-    """Topics of an emulated arm, and a controller manager that writes down what it is asked."""
+class LoggedTopics:
+    """Topics of an emulated arm."""
 
     def __init__(self, _params: RosControllersParams) -> None:
         self._arm = EmulatedTwistArm(TwistControllerParams(start_height_m=0.003), time.monotonic_ns())
-        self._log = Path(os.environ['MANAGED_LOG'])
+        self._log = Path(os.environ['LOGGED_ARM'])
         self._velocity = (0.0, 0.0, 0.0)
 
     def newest_pose(self):
@@ -49,25 +48,13 @@ class ManagedTopics:
         self._velocity = velocity_m_s
         self._arm.command(time.monotonic_ns(), np.array(velocity_m_s))
 
-    def send_force(self, _force_n):
-        pass
-
-    def switch_controllers(self, activate, deactivate):
-        switch = {
-            'activated': [*activate],
-            'deactivated': [*deactivate],
-            'at_rest': not any(self._velocity),
-            'height_m': self._arm.finger().z_m,
-        }
-        with self._log.open('a') as log:
-            print(json.dumps(switch), file=log)
-
     def close(self):
-        pass
+        end = {'at_rest': not any(self._velocity), 'height_m': self._arm.finger().z_m}
+        self._log.write_text(json.dumps(end))
 
 
-class ManagedArm(RosControllersArm):
+class LoggedArm(RosControllersArm):
     """See the module."""
 
     def __init__(self, params: RosControllersParams) -> None:
-        super().__init__(params, open_topics=ManagedTopics)
+        super().__init__(params, open_topics=LoggedTopics)
