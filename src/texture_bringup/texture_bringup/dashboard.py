@@ -12,6 +12,7 @@ import os
 import secrets
 import socket
 import threading
+import time
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,7 +31,7 @@ from texture_core.errors import InvalidParameter, LaunchFailed, TextureError
 TOKEN_VARIABLE = 'TEXTURE_DASHBOARD_TOKEN'
 COOKIE = 'texture_token'
 MIN_TOKEN = 16
-WRONG_TOKEN_S = 1.0  # after which a request without the right token is answered, so that guessing takes ages
+FREE_GUESSES, LONGEST_WAIT_S, MAX_ADDRESSES = 5, 300.0, 1000
 
 
 @dataclass(frozen=True)
@@ -106,6 +107,32 @@ def _name(url: str) -> str:
         return ''
 
 
+class Guesses:
+    """Wrong tokens by address: after a few, each doubles the time until the next is checked.
+
+    A repeated token counts once: it comes from an open page with an outdated token and is no guess.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._wrong: dict[str, tuple[int, float, str]] = {}  # their number, and time and text of the last
+
+    def wait_s(self, address: str) -> float:
+        """Return for how long no token from an address is checked."""
+        count, last_s, _ = self._wrong.get(address, (0, 0.0, ''))
+        if count <= FREE_GUESSES:
+            return 0.0
+        doublings = min(count - FREE_GUESSES, 60)  # a power of thousands overflows
+        return max(0.0, last_s + min(2.0**doublings, LONGEST_WAIT_S) - self._clock())
+
+    def note(self, address: str, token: str) -> None:
+        """Count a wrong token; above MAX_ADDRESSES the one that is silent for longest is removed."""
+        count, last_s, last = self._wrong.pop(address, (0, 0.0, ''))
+        self._wrong[address] = (count, last_s, last) if token == last else (count + 1, self._clock(), token)
+        if len(self._wrong) > MAX_ADDRESSES:
+            del self._wrong[next(iter(self._wrong))]
+
+
 # --------------------
 # The recordings that the page starts: each in a separate process, one at a time.
 
@@ -162,7 +189,7 @@ MAX_BODY_BYTES = 4096
 MAX_MESSAGE_BYTES = 1024
 MAX_VIEWERS = 16
 HEARTBEAT_S = 10.0
-REQUEST_S = 15.0  # that a request may take to come
+REQUEST_S, LOOK_S = 15.0, 1.0  # that a request may take to come, and how often that is looked at
 SERVER_CLOSING_S = 1.0
 PAGE: Mapping[str, tuple[str, str]] = {
     '/': ('index.html', 'text/html'),
@@ -223,12 +250,14 @@ class Viewers:
 
 
 VIEWERS: web.AppKey[Viewers] = web.AppKey('viewers', Viewers)
+BUSY: web.AppKey[set[Any]] = web.AppKey('busy', set)  # connections whose request is being answered
 
 
 def make_app(commands: Any, access: Access, page: Path) -> web.Application:
     """Return the application, which is not started yet."""
     app = web.Application(middlewares=[_guard(access)], client_max_size=MAX_BODY_BYTES)
     viewers = app[VIEWERS] = Viewers()
+    app[BUSY] = set()
 
     async def motions(_request: web.Request) -> web.StreamResponse:
         return web.json_response(await commands.offered())
@@ -254,18 +283,20 @@ def make_app(commands: Any, access: Access, page: Path) -> web.Application:
 
 def _guard(access: Access) -> Any:
     """Return the middleware that checks every request."""
+    guesses = Guesses()
 
     @web.middleware
     async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
+        request.app[BUSY].add(request.protocol)
         try:
-            refusal = _refusal(access, request)
-            if refusal is not None and refusal.status == web.HTTPUnauthorized.status_code:
-                await asyncio.sleep(WRONG_TOKEN_S)
+            refusal = _refusal(access, guesses, request)
             # Not `or`: to Ubuntu's aiohttp, 3.9, a response in which nothing was stored is false.
             response = await handler(request) if refusal is None else refusal
         except web.HTTPException as error:
             error.headers.update(HEADERS)
             raise
+        finally:
+            request.app[BUSY].discard(request.protocol)
         if not response.prepared:
             response.headers.update(HEADERS)
         return response
@@ -273,13 +304,16 @@ def _guard(access: Access) -> Any:
     return guard
 
 
-def _refusal(access: Access, request: web.Request) -> web.StreamResponse | None:
+def _refusal(access: Access, guesses: Guesses, request: web.Request) -> web.StreamResponse | None:
     """Return why a request is refused, or the answer that turns a token in the address into a cookie."""
     if not access.is_our_host(request.headers.get('Host', '')):
         return _failure(403, 'this host name is not accepted; use the address that the dashboard printed')
     changes = request.method != 'GET' or request.path == '/ws'
     if changes and not access.is_our_origin(request.headers):
         return _failure(403, 'the request comes from another page; use the page of the dashboard')
+    address = request.remote or ''
+    if access.token and (wait_s := guesses.wait_s(address)):
+        return _failure(429, f'too many wrong tokens came from {address}; the next is checked in {wait_s:.0f} s')
     given = request.query.get('token', '')
     if request.path == '/' and given and access.token and access.knows(given):
         answer = web.Response(status=303, headers={'Location': '/'})
@@ -287,6 +321,8 @@ def _refusal(access: Access, request: web.Request) -> web.StreamResponse | None:
         return answer
     carried = request.cookies.get(COOKIE, '') or request.headers.get('Authorization', '').removeprefix('Bearer ')
     if not access.knows(carried):
+        if given or carried:
+            guesses.note(address, f'{given} {carried}')  # both were checked
         return _failure(401, 'this page needs its token: open the address that the dashboard printed, with ?token=')
     return None
 
@@ -365,8 +401,22 @@ class Serving:
         try:
             await web.TCPSite(runner, host, port).start()
             self._started.set_result(int(runner.addresses[0][1]))
+            silent = self._loop.create_task(self._close_silent(runner))
             await self._closing.wait()
+            silent.cancel()
         except OSError as error:
             self._started.set_exception(error)
         finally:
             await runner.cleanup()
+
+    async def _close_silent(self, runner: web.AppRunner) -> None:
+        """Close each connection whose next request does not come in time."""
+        since_s: dict[Any, float] = {}
+        while True:
+            await asyncio.sleep(LOOK_S)
+            now_s, server = self._loop.time(), runner.server
+            waiting = [one for one in (server.connections if server else ()) if one not in self._app[BUSY]]
+            since_s = {one: since_s.get(one, now_s) for one in waiting}
+            for one, begun_s in since_s.items():
+                if now_s - begun_s > REQUEST_S:
+                    one.force_close()
