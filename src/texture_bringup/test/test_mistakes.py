@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a user gets who gives `texture` the wrong thing: exit code 2 and one sentence that says what to do."""
 
+import os
 import shutil
 from dataclasses import replace
 
@@ -26,6 +27,7 @@ def data(tmp_path_factory):
     bags = [str(folder / 'glass'), str(folder / 'leather')]
     assert main(['train', 'default', *bags, '-o', str(folder / 'fast')]) == 0
     assert main(['train', 'vibration-and-taxels', *bags, '-o', str(folder / 'all')]) == 0
+    os.mkfifo(folder / 'pipe')
     return folder
 
 
@@ -117,13 +119,17 @@ def test_a_model_that_needs_the_slow_channels_refuses_a_bag_without_them(data, c
         ('launch emulatr', "no launch file 'emulatr'; did you mean 'emulator'?"),
         ('launch emulator surfcae:=glass', "did you mean 'surface'?"),
         ('launch emulator surface', 'write NAME:=VALUE'),
+        ('launch emulator surface:=glas', "no surface 'glas'; did you mean 'glass'?"),
+        ('launch emulator recipe:=defualt', "did you mean 'default'?"),
+        ('launch emulator model:=nowhere', "there is no model 'nowhere'"),
+        ('launch emulator model:=pipe', "argument 'model' is 'pipe', which is neither a regular file"),
         ('launch replay', 'give bag:=VALUE'),
+        ('launch replay bag:=nowhere', "there is no bag 'nowhere'"),
         ('replay glass --rate nan', "parameter 'rate' is nan; allowed is 0.01 to 1000.0"),
         ('import tabel map.yaml . out', "did you mean 'table'?"),
         ('demo --recipe defualt', "did you mean 'default'?"),
         ('dashboard --port 99999', 'allowed is 0 to 65535'),
         ('import biotac . .', 'biotac20'),
-        ('import table map.yaml . out --slides 1', 'of table the mapping file says what is read'),
     ],
 )
 def test_what_is_missing_or_mistyped_is_named(command, sentence, data, capsys, monkeypatch) -> None:

@@ -483,8 +483,20 @@ def given_arguments(texts: Iterable[str]) -> dict[str, str]:
     return given
 
 
+def _refuse_special(given: Mapping[str, str]) -> None:
+    """Refuse an argument that names a special file, which nodes would read without end, unless it is a device."""
+    for name, value in given.items():
+        path = Path(value).expanduser()
+        if 'device' in name or not path.exists() or path.is_file() or path.is_dir():
+            continue
+        raise InvalidLaunch(
+            f"argument '{name}' is '{value}', which is neither a regular file nor a folder; give the path of one"
+        )
+
+
 def read(path: Path, given: Mapping[str, str], environment: Mapping[str, str]) -> list[NodeDescription]:
     """Return the nodes of a launch file, in its order."""
+    _refuse_special(given)
     reader = _Reader(given, environment)
     reader.read_file(path)
     for name in given:

@@ -8,10 +8,14 @@ import argparse
 import os
 import signal
 import sys
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
+from multiprocessing import get_context
 from pathlib import Path
 
 from texture_bringup.launcher import (
+    NodeDescription,
     Supervisor,
     all_arguments,
     end_with,
@@ -45,8 +49,61 @@ def _launch(options: argparse.Namespace) -> int:
     if options.show_args:
         print(arguments_text(path))
         return 0
-    nodes = read(path, given_arguments(options.arguments), os.environ)
+    given = given_arguments(options.arguments)
+    nodes = read(path, given, os.environ)
+    refuse_wrong(nodes, set(given.values()))
     return Supervisor(nodes, _say, together=options.together).run()
+
+
+# What a node would refuse, by its program: the parameters of which all are looked at if one of them was given.
+LOOKED_AT = {
+    'emulator': ('scene', 'surface'),
+    'classifier': ('model',),
+    'roughness_estimator': ('model',),
+    'feature_extractor': ('recipe',),
+    'replay': ('bag',),
+}
+
+
+def _look_at(program: str, value: str, *more: str) -> None:
+    """Load what a program would load of its parameters; TextureError if it cannot be."""
+    if program == 'emulator':
+        from texture_simulation.scene import load_scene
+
+        load_scene(value).surface(*more)
+    elif program == 'classifier':
+        from texture_estimation.model import load_model
+
+        load_model(value)
+    elif program == 'roughness_estimator':
+        from texture_estimation.roughness import load_roughness_model
+
+        load_roughness_model(value)
+    elif program == 'feature_extractor':
+        from texture_features.feature_set import FeatureSet
+
+        FeatureSet.load(value)
+    else:
+        from texture_recordings.bags import find_bags
+
+        find_bags([value])
+
+
+def refuse_wrong(nodes: Sequence[NodeDescription], given: set[str]) -> None:
+    """Raise, before any node starts, the error of a node of the suite for a value that was given.
+
+    In a separate process: libraries that start threads must not be in a launcher.
+    """
+    wanted = []
+    for node in nodes:
+        known = {name: value for one in node.parameters if isinstance(one, Mapping) for name, value in one.items()}
+        values = [str(known.get(name, '')) for name in LOOKED_AT.get(node.executable, ())]
+        if all(values) and given.intersection(values):
+            wanted.append((node.executable, *values))
+    if wanted:
+        with ProcessPoolExecutor(1, get_context('fork')) as pool:
+            for one in wanted:
+                pool.submit(_look_at, *one).result()
 
 
 def arguments_text(path: Path) -> str:
