@@ -11,6 +11,8 @@ import sys
 import time
 from pathlib import Path
 from types import SimpleNamespace
+from urllib.error import URLError
+from urllib.request import urlopen
 
 import pytest
 
@@ -62,6 +64,15 @@ def test_an_answer_is_as_expected_if_label_and_rejection_are(
     estimate = TextureEstimate(0, 'a', label, rejection)
     answer = ExplorationResult(ExplorationError.NONE, '', 'a', estimate, RoughnessEstimate(0, 'a'))
     assert Slide('glass', 'glass', expected, answer, []).as_expected is as_expected
+
+
+def page_at(address: str) -> bytes:
+    """Return a page, or nothing if no server answers yet."""
+    try:
+        with urlopen(address, timeout=DEADLINE_S) as page:
+            return page.read()
+    except URLError:
+        return b''
 
 
 ENDS = {
@@ -118,15 +129,21 @@ def test_it_accepts_trained_surfaces_and_rejects_others_and_leaves_a_picture(tmp
 
 
 @pytest.mark.ros
-def test_ctrl_c_ends_it_cleanly_and_leaves_no_process(tmp_path) -> None:
-    command = [sys.executable, '-m', 'texture_bringup.command', 'demo', '--out', str(tmp_path)]
+def test_it_serves_the_page_of_the_operator_and_ctrl_c_ends_it_cleanly_and_leaves_no_process(tmp_path) -> None:
+    command = [sys.executable, '-m', 'texture_bringup.command', 'demo', '--dashboard', '--out', str(tmp_path)]
     with (
         subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as demo,
         killed_on_error(demo),
     ):
         for line in demo.stdout:
+            if 'dashboard: ' in line:
+                address = line.split()[1]
             if 'Trained surfaces' in line:
                 break
+        deadline = time.monotonic() + DEADLINE_S
+        while b'<html' not in page_at(address):  # the server is up a moment after its node
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
         pids = started(tmp_path / 'nodes.log')
         demo.send_signal(signal.SIGINT)
         _, said = demo.communicate(timeout=DEADLINE_S)
@@ -135,7 +152,7 @@ def test_ctrl_c_ends_it_cleanly_and_leaves_no_process(tmp_path) -> None:
     shown = r'((waiting:|waiting for|fit|read bags|compute features) [^\n]*\n)*'
     assert re.fullmatch(rf'{shown}texture: interrupted\n', said), said
     assert 'Traceback' not in said
-    assert len(pids) == 7
+    assert len(pids) == 8
     assert not any(Path(f'/proc/{pid}').exists() for pid in pids)
 
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import socket
@@ -56,6 +57,15 @@ def _is_free(port: int) -> bool:
         except OSError:
             return False
     return True
+
+
+def _free_port() -> int:
+    """Return the usual port of the dashboard, or one that is free."""
+    for port in (8085, 0):
+        with socket.socket() as probe, contextlib.suppress(OSError):
+            probe.bind(('127.0.0.1', port))
+            return int(probe.getsockname()[1])
+    raise LaunchFailed('no TCP port is free; stop another program first')
 
 
 # --------------------
@@ -163,7 +173,7 @@ START_DEADLINE_S = 60.0  # a slow machine that imports everything for the first 
 ATTEMPTS = 3  # a machine that is busy with something else delays the emulated arm, and the explorer aborts
 
 
-def demonstrate(out: Path, recipe: str, seed: int, progress: ProgressLog) -> bool:
+def demonstrate(out: Path, recipe: str, seed: int, progress: ProgressLog, *, dashboard: bool = False) -> bool:
     """Train, recognise and reject on the emulator, and report; return whether every answer was as expected."""
     _clear(out)
     _train(out, recipe, seed, progress)
@@ -171,7 +181,7 @@ def demonstrate(out: Path, recipe: str, seed: int, progress: ProgressLog) -> boo
     with tempfile.TemporaryDirectory(prefix='texture_demo_') as name:
         folder = Path(name)
         (folder / 'explorer.yaml').write_text(f'/**/explorer: {{ros__parameters: {{edge_m: {EDGE_M}}}}}\n')
-        arguments = {
+        arguments: dict[str, Any] = {
             'devices': folder,
             'explorer_params': folder / 'explorer.yaml',
             'recipe': (out / f'{MODEL}.json').resolve(),
@@ -179,6 +189,8 @@ def demonstrate(out: Path, recipe: str, seed: int, progress: ProgressLog) -> boo
             'roughness_model': (out / f'{ROUGHNESS}.json').resolve(),
             'seed': seed + 1,
         }
+        if dashboard:
+            arguments |= {'dashboard': 'true', 'dashboard_port': _free_port()}
         domain_id = free_domain()
         environment = isolated(domain_id, {**os.environ, 'ROS_LOG_DIR': str(folder / 'ros_log')})
         with (
@@ -187,6 +199,9 @@ def demonstrate(out: Path, recipe: str, seed: int, progress: ProgressLog) -> boo
         ):
             operator.wait_for_explorer(START_DEADLINE_S)
             operator.wait_for_signal(START_DEADLINE_S)
+            if dashboard:
+                operator.wait_for_node('dashboard', START_DEADLINE_S)
+                progress.line(f'dashboard: http://127.0.0.1:{arguments["dashboard_port"]} while this runs')
             slides = _explore(operator, progress)
     _report(slides, out, progress)
     return all(slide.as_expected for slide in slides)

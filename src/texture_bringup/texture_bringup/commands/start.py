@@ -143,6 +143,7 @@ def _dashboard(options: argparse.Namespace) -> int:
 def _configure_demo(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--out', type=Path, default=Path('texture-demo'), metavar='DIR', help='folder for the results')
     parser.add_argument('--recipe', default='default', metavar='NAME', help='recipe that is trained (default: default)')
+    parser.add_argument('--dashboard', action='store_true', help='serve the web page of the operator while it runs')
     add_seed(parser)
 
 
@@ -154,7 +155,8 @@ def _demo(options: argparse.Namespace) -> int:
     load_recipe(options.recipe)  # refused before the nodes start
     progress = ProgressLog()
     progress.line('Everything physical in this demonstration is simulated: surfaces, arm and sensor.')
-    return 0 if demonstrate(options.out, options.recipe, options.seed, progress) else 1
+    right = demonstrate(options.out, options.recipe, options.seed, progress, dashboard=options.dashboard)
+    return 0 if right else 1
 
 
 launch = Command('start the nodes of a launch file', _configure_launch, _launch)
