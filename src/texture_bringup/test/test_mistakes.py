@@ -31,6 +31,13 @@ def data(tmp_path_factory):
     return folder
 
 
+def test_a_model_is_described_by_its_labels_and_topics(data, capsys) -> None:
+    assert main(['info', str(data / 'all')]) == 0
+    said = capsys.readouterr().out
+    assert 'trained on 2 surfaces: glass, leather' in said
+    assert 'topics: signal, signal_static' in said
+
+
 def changed(source, target, change):
     """Write a bag with what `change(topic, value)` returns for each message; None leaves it out."""
     with BagWriter(target) as bag:
@@ -126,6 +133,8 @@ def test_a_model_that_needs_the_slow_channels_refuses_a_bag_without_them(data, c
         ('launch replay', 'give bag:=VALUE'),
         ('launch replay bag:=nowhere', "there is no bag 'nowhere'"),
         ('replay glass --rate nan', "parameter 'rate' is nan; allowed is 0.01 to 1000.0"),
+        ('list sensor', "did you mean 'sensors'?"),
+        ('info nowhere', "there is no bag 'nowhere'"),
         ('import tabel map.yaml . out', "did you mean 'table'?"),
         ('demo --recipe defualt', "did you mean 'default'?"),
         ('dashboard --port 99999', 'allowed is 0 to 65535'),

@@ -52,6 +52,28 @@ def test_a_recording_is_shown_as_a_line_for_each_change_without_a_terminal(bag, 
     assert lines[-1].startswith('done')
 
 
+def test_a_bag_is_described_by_its_messages_and_slides(bag, capsys):
+    assert main(['info', str(bag)]) == 0
+    said = capsys.readouterr().out
+    assert '1 messages of tsf85/dynamic, 1 × 1000 Hz' in said
+    assert '1 done' in next(one for one in said.splitlines() if one.strip().startswith('cork'))
+
+
+@pytest.mark.parametrize(
+    ('what', 'named'),
+    [
+        ('sensors', 'tsf85'),
+        ('motions', 'distance_m 0.1'),
+        ('arms', 'rails'),
+        ('recipes', 'default'),
+        ('surfaces', 'glass'),
+    ],
+)
+def test_a_catalogue_is_listed(what, named, capsys):
+    assert main(['list', what]) == 0
+    assert named in capsys.readouterr().out
+
+
 def test_the_machine_is_shown_on_one_screen(capsys):
     assert main(['doctor']) == 0
     names = [one.split('  ')[0] for one in capsys.readouterr().out.splitlines()]

@@ -27,10 +27,10 @@ from texture_core.config import find
 GROUP, PACKAGE = 'texture.commands', 'texture_bringup'
 # In what order the help shows the commands; those of other packages come last.
 HELP: Mapping[str, Sequence[str]] = {
-    'Start': ('demo', 'doctor', 'launch', 'dashboard', 'activate', 'deactivate', 'set'),
+    'Start': ('demo', 'doctor', 'list', 'launch', 'dashboard', 'activate', 'deactivate', 'set'),
     'Explore with the running robot': ('explore', 'watch', 'identify', 'stop', 'lift', 'recover', 'reboot'),
     'Prepare': ('tare', 'touch-surface', 'forget-touches', 'check'),
-    'Record': ('collect', 'record', 'replay', 'import', 'segment', 'export'),
+    'Record': ('collect', 'record', 'replay', 'info', 'import', 'segment', 'export'),
     'Learn': ('train', 'add', 'remove'),
     'Measure': ('evaluate', 'cross-validate', 'panel', 'experiment', 'benchmark', 'endurance'),
 }

@@ -1,0 +1,165 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The sub-commands of `texture` that show catalogues, and a bag or a model."""
+
+from __future__ import annotations
+
+import argparse
+import inspect
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
+from types import ModuleType
+
+import yaml
+
+from texture_core.cli import Command
+from texture_core.config import find, folder, shipped
+from texture_core.types import NANOSECONDS
+
+# What a command needs is imported when it runs: each looks at other packages.
+# ruff: noqa: PLC0415
+
+Row = tuple[str, str]
+
+
+def table(rows: Iterable[Row]) -> str:
+    """Return rows of a name and a text as lines, the texts below each other."""
+    rows = list(rows)
+    width = max((len(name) for name, _ in rows), default=0)
+    return '\n'.join(f'{name:<{width}}  {text}'.rstrip() for name, text in rows)
+
+
+# --------------------
+# List what can be chosen.
+
+
+def _catalogue(module: ModuleType) -> list[Row]:
+    """Return each name of a catalogue with the comment next to it in the source."""
+    return re.findall(r"^    '(\w+)': .*  # (.+)$", inspect.getsource(module), re.MULTILINE)
+
+
+def _sensors() -> Iterable[Row]:
+    from texture_drivers import catalogue
+
+    return _catalogue(catalogue)
+
+
+def _arms() -> Iterable[Row]:
+    from texture_exploration.arms import catalogue
+
+    return _catalogue(catalogue)
+
+
+def _motions() -> Iterator[Row]:
+    from texture_exploration.motions import DEFAULTS
+    from texture_exploration.safety import SafetyLimits
+
+    for motion, defaults in DEFAULTS.items():
+        ranges = {name: (value, *SafetyLimits().range(name)) for name, value in defaults.items()}
+        yield (
+            motion,
+            ', '.join(
+                f'{name} {value:g} ({low:g} to {high:g} {unit})' for name, (value, low, high, unit) in ranges.items()
+            ),
+        )
+
+
+def _recipes() -> Iterator[Row]:
+    for kind in ('config/recipes', 'config/roughness'):
+        ours = folder('texture_estimation', kind)
+        # Those of the papers come last.
+        for name, path in sorted(shipped('texture_estimation', kind).items(), key=lambda one: one[1].parent != ours):
+            yield name, str(yaml.safe_load(path.read_text(encoding='utf-8')).get('description', ''))
+
+
+def _surfaces() -> Iterator[Row]:
+    from texture_simulation.scene import load_scene
+
+    for name in shipped('texture_simulation', 'config/scenes'):
+        scene = load_scene(name)
+        yield name, f'{scene.sensor}: {", ".join(scene.surfaces)}'
+
+
+LISTS: Mapping[str, tuple[str, Callable[[], Iterable[Row]]]] = {
+    'sensors': ('what `sensor:=` of a launch takes', _sensors),
+    'motions': ('what `texture explore` takes, with default and range of each number', _motions),
+    'arms': ('what the parameter `arm` of the explorer takes', _arms),
+    'recipes': ('what `texture train` takes', _recipes),
+    'surfaces': ('what the emulator simulates, by scene', _surfaces),
+}
+
+
+def _configure_list(parser: argparse.ArgumentParser) -> None:
+    about = '; '.join(f'{name}: {meaning}' for name, (meaning, _) in LISTS.items())
+    parser.add_argument('what', metavar='{' + ','.join(LISTS) + '}', help=about)
+
+
+def _list(options: argparse.Namespace) -> int:
+    print(table(find(LISTS, options.what, 'list')[1]()))
+    return 0
+
+
+# --------------------
+# What a bag or a model holds.
+
+
+def _configure_info(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument('path', help='bag, folder of bags, or model')
+    parser.add_argument('--namespace', metavar='NS', help='namespace of the recorded nodes, if there are several')
+
+
+def _info(options: argparse.Namespace) -> int:
+    from texture_recordings.bags import find_bags
+
+    path = Path(options.path)
+    # A model is one of two files with the same name; everything else is read as a bag, whose errors are reported.
+    if not path.is_dir() and (path.suffix in ('.npz', '.json') or path.with_name(f'{path.name}.npz').is_file()):
+        print('\n'.join(_model_lines(path)))
+        return 0
+    for bag in find_bags([path]):
+        print(f'{bag}\n{table(_bag_rows(bag, options.namespace))}')
+    return 0
+
+
+def _model_lines(path: Path) -> list[str]:
+    from texture_core.config import load_card
+    from texture_estimation.model import load_model
+    from texture_estimation.roughness import load_roughness_model
+    from texture_evaluation.commands.train import graded_summary, summary
+
+    card = path.with_name(f'{path.name.removesuffix(".npz").removesuffix(".json")}.json')
+    if card.is_file() and 'regressor' in load_card(card):
+        graded = load_roughness_model(path)
+        return [f'roughness model {graded.name}', *graded_summary(graded, path)[:-1]]
+    model = load_model(path)
+    return [f'model {model.name}', *summary(model, path)[:-1], f'topics: {", ".join(model.recipe.feature_set.topics)}']
+
+
+def _bag_rows(bag: Path, namespace: str | None) -> Iterator[Row]:
+    """Yield number of messages by topic, length, sensors, and the slides over each surface of a bag."""
+    from texture_core.types import ExplorationState, Phase, TactileSignal
+    from texture_recordings.bags import read_bag
+
+    counts: Counter[str] = Counter()
+    ends: dict[str, tuple[str, Phase]] = {}
+    sensors: dict[str, str] = {}
+    first_ns = last_ns = 0
+    for topic, log_ns, value in read_bag(bag, None, namespace):
+        counts[topic] += 1
+        first_ns, last_ns = first_ns or log_ns, log_ns
+        if isinstance(value, TactileSignal):
+            sensors.setdefault(topic, f'{value.sensor}, {len(value.channels)} × {value.sampling_rate_hz:g} Hz')
+        elif isinstance(value, ExplorationState) and value.exploration_id:
+            ends[value.exploration_id] = value.surface, value.phase
+    yield '  length', f'{(last_ns - first_ns) / NANOSECONDS:.1f} s'
+    for topic, count in sorted(counts.items()):
+        yield f'  {topic}', f'{count} messages{f" of {sensors[topic]}" if topic in sensors else ""}'
+    for surface in sorted({surface for surface, _ in ends.values()}):
+        phases = Counter(phase.value for name, phase in ends.values() if name == surface)
+        yield f'  {surface or "(no surface)"}', ', '.join(f'{count} {phase}' for phase, count in phases.items())
+
+
+list_ = Command('list what can be chosen: sensors, motions, arms, recipes, surfaces', _configure_list, _list)
+info = Command('show what a bag or a model holds', _configure_info, _info)
