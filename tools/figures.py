@@ -10,9 +10,8 @@ A page marks where a table goes, and its rows between the marks are replaced:
     <!-- end -->
 
 `docs/tables/NAME.md` is the table with a source in braces instead of each figure: `{trust/default/accuracy;.1%}` is a
-file of `docs/charts` without its ending, the keys below `numbers` (`/` in a key is `~1`, `*` takes every entry), and a
-format: a Python format, optionally times a factor (`.0f*1e6`), `.1%` for percent without the sign, after `min`, `max`,
-`mean`, `sum` or `len` where there are several entries. `A minus B` is a difference. A stored null is printed as a dash.
+file of `docs/charts` without its ending, the keys below `numbers` (`/` in a key is `~1`), and a format of Python,
+optionally times a factor (`.0f*1e6`), `.1%` for percent without the sign. A stored null is printed as a dash.
 """
 
 from __future__ import annotations
@@ -24,15 +23,12 @@ import sys
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 from pathlib import Path
-from statistics import fmean
 from typing import Any
 
 ROOT = Path(__file__).parents[1]
 PAGES = ('README.md', 'docs/*.md')
 BLOCK = re.compile(r'(?P<begin><!-- table: (?P<name>\S+) -->\n)(?P<rows>.*?)(?P<end><!-- end -->)', re.DOTALL)
 FIGURE = re.compile(r'\{(?P<source>[^;{}]+);(?P<form>[^{}]+)\}')
-FORM = re.compile(r'^(?:(?P<reduce>min|max|mean|sum|len) )?(?P<format>[^*\s]*)(?:\*(?P<factor>[\d.e-]+))?$')
-REDUCTIONS = {'min': min, 'max': max, 'mean': fmean, 'sum': sum, 'len': len}
 
 
 class BadFigure(ValueError):
@@ -48,36 +44,25 @@ def numbers(path: Path) -> Any:
 
 
 def entry(source: str, root: Path) -> Any:
-    """Return what is stored at a source, such as 'trust/default/accuracy'; a list if it holds `*`."""
+    """Return what is stored at a source, such as 'trust/default/accuracy'."""
     name, *keys = (part.replace('~1', '/') for part in source.strip().split('/'))
-    found = [numbers(root / 'docs' / 'charts' / f'{name}.json')]
-    for key in keys:
-        found = [value for held in found for value in below(held, key, source)]
-    return found if '*' in keys else found[0]
-
-
-def below(held: Any, key: str, source: str) -> list[Any]:
-    """Return what is stored below a key; everything for `*`."""
+    held = numbers(root / 'docs' / 'charts' / f'{name}.json')
     try:
-        if key == '*':
-            return list(held.values() if isinstance(held, dict) else held)
-        return [held[int(key)] if isinstance(held, list) else held[key]]
+        for key in keys:
+            held = held[int(key)] if isinstance(held, list) else held[key]
     except (KeyError, IndexError, ValueError, TypeError):
         raise BadFigure(f"'{source}' ends at '{key}'") from None
+    return held
 
 
 def figure(source: str, form: str, root: Path) -> str:
     """Return a figure as it is to be printed."""
-    parsed = FORM.match(form.strip())
-    if parsed is None:
-        raise BadFigure(f"'{form}' is no format; write one such as .1f, .1%, .0f*1e6 or 'max .1%'")
-    left, *right = (entry(part, root) for part in source.split(' minus '))
-    if left is None:
+    held = entry(source, root)
+    if held is None:
         return '–'
+    form, _, factor = form.strip().partition('*')
     try:
-        left = left - right[0] if right else left
-        left = REDUCTIONS[parsed['reduce']](left) if parsed['reduce'] else left
-        text = format(left * float(parsed['factor']) if parsed['factor'] else left, parsed['format'])
+        text = format(held * float(factor) if factor else held, form)
     except (TypeError, ValueError) as error:
         raise BadFigure(f"'{source}' is no number for '{form}': {error}") from None
     return text.replace('%', '').replace('-', '−')

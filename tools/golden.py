@@ -213,13 +213,22 @@ def _tolerance(where: str) -> float:
     return of_features if '/features/' in where else of_learnt
 
 
+def names(only: str = '') -> list[str]:
+    """Return the names of the rows that can be computed here, or of those that contain a word."""
+    found = [name for name in ARMS if arm_available(name)]
+    for name, source in SOURCES.items():
+        if available(source):
+            found += [f'{recipe} on {name}' for recipe in _recipes(source)]
+    return [name for name in found if only in name]
+
+
 def rows(only: str = '') -> dict[str, Any]:
     """Return all rows, or those whose name contains a word; without those of absent data."""
-    arms = {name: explore for name, explore in ARMS.items() if only in name and arm_available(name)}
-    found: dict[str, Any] = {name: explore(Recording()) for name, explore in arms.items()}
+    wanted = names(only)
+    found: dict[str, Any] = {name: ARMS[name](Recording()) for name in wanted if name in ARMS}
     for name, source in SOURCES.items():
-        recipes = [recipe for recipe in _recipes(source) if only in f'{recipe} on {name}']
-        if not recipes or not available(source):
+        recipes = [recipe for recipe in _recipes(source) if f'{recipe} on {name}' in wanted]
+        if not recipes:
             continue
         with tempfile.TemporaryDirectory() as folder:
             bags = _bags(source, Path(folder))
@@ -238,14 +247,6 @@ def every_recipe() -> dict[str, str]:
     """Return all shipped recipes in the order of their names, with their kind: 'recipes' or 'roughness'."""
     files = sorted(ROOT.glob('src/*/config/recipes/*.yaml')) + sorted(ROOT.glob('src/*/config/roughness/*.yaml'))
     return {path.stem: path.parent.name for path in sorted(files, key=lambda path: path.stem)}
-
-
-def known_rows() -> set[str]:
-    """Return the names of all rows that can be computed here, and of those that are stored."""
-    stored = _expected('') if STORED.exists() else {}
-    sources = {name: source for name, source in SOURCES.items() if available(source)}
-    of_recipes = {f'{recipe} on {name}' for name, source in sources.items() for recipe in _recipes(source)}
-    return {*stored, *filter(arm_available, ARMS), *of_recipes}
 
 
 def _recipes(source: GoldenSlides) -> list[str]:
@@ -506,34 +507,16 @@ def arm_available(name: str) -> bool:
     return name != 'arms: dynamixel' or importlib.util.find_spec('dynamixel_sdk') is not None
 
 
-def _expected(only: str) -> dict[str, Any]:
-    """Return the stored rows that can be computed here."""
-    stored: dict[str, Any] = json.loads(STORED.read_text())
-    return {
-        name: row for name, row in stored.items() if only in name and not {name, name.partition(' on ')[2]} & absent()
-    }
-
-
-def absent() -> set[str]:
-    """Return the sources whose data and the arms whose libraries are not here."""
-    return {name for name, source in SOURCES.items() if not available(source)} | {
-        name for name in ARMS if not arm_available(name)
-    }
-
-
-def verdict(only: str = '') -> str:
-    """Return that the golden set agrees, and which part of it could not be compared here."""
-    stored = json.loads(STORED.read_text())
-    left_out = {name for name in stored if only in name} - _expected(only).keys()
-    missing = ', '.join(sorted({name.partition(' on ')[2] or name for name in left_out}))
-    if not left_out:
-        return 'the golden set agrees'
-    return f'what could be compared agrees; {len(left_out)} rows were not compared, as this is missing here: {missing}'
+def stored_rows() -> dict[str, Any]:
+    """Return what is stored."""
+    stored: dict[str, Any] = json.loads(STORED.read_text()) if STORED.exists() else {}
+    return stored
 
 
 def check(only: str = '', strict: bool = False) -> list[str]:
-    """Return one line for each difference from the stored rows."""
-    return list(differences(_expected(only), rows(only), strict=strict))
+    """Return one line for each difference from the stored rows that can be computed here."""
+    stored = stored_rows()
+    return list(differences({name: stored.get(name) for name in names(only)}, rows(only), strict=strict))
 
 
 def main() -> int:
@@ -545,7 +528,8 @@ def main() -> int:
     parser.add_argument('--only', default='', metavar='WORD', help='only rows whose name contains it')
     parser.add_argument('--strict', action='store_true', help='on the machine that stored them: no looser recipes')
     options = parser.parse_args()
-    if not any(options.only in name for name in known_rows()):
+    here, stored = names(options.only), stored_rows()
+    if not here:
         print(
             f"golden: no row that can be computed here has '{options.only}' in its name; "
             "write a part of one, such as 'default on oriented', and add a new recipe to SOURCES",
@@ -554,11 +538,12 @@ def main() -> int:
         return 2
     if options.check:
         lines = check(options.only, options.strict)
-        print('\n'.join(lines) or verdict(options.only))
+        left_out = [name for name in stored if options.only in name and name not in here]
+        print('\n'.join([*lines, f'{len(lines)} differences in {len(here)} rows']))
+        print(f'not compared, as data or a library is missing here: {", ".join(left_out) or "none"}')
         return bool(lines)
-    stored = json.loads(STORED.read_text()) if STORED.exists() else {}
-    kept = {name: row for name, row in stored.items() if name not in _expected(options.only)} if stored else {}
-    lines = [f'{json.dumps(name)}: {json.dumps(row)}' for name, row in sorted({**kept, **rows(options.only)}.items())]
+    found = {**{name: row for name, row in stored.items() if name not in here}, **rows(options.only)}
+    lines = [f'{json.dumps(name)}: {json.dumps(row)}' for name, row in sorted(found.items())]
     STORED.write_text('{\n' + ',\n'.join(lines) + '\n}\n')
     return 0
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Write the pages of docs/reference from the source: `python tools/reference.py`, or `--check` to compare only.
+"""Write the pages of docs/reference from the source: `python tools/reference.py`.
 
 They hold the messages with their comments, the commands with their options, the arguments of the launch files, all
 parameters, the catalogues of sensors, motions, features and simulated surfaces, the shipped recipes, and the figures of
@@ -16,7 +16,6 @@ import importlib
 import inspect
 import json
 import re
-import sys
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, cast
@@ -275,28 +274,23 @@ def grades(root: Path) -> str:
         '| without a grade | paper: spread within a texture | here |',
         '|---|---|---|---|---|---|---|---|---|',
     ]
-    sources = {'roughness': '', 'roughness-tuned': ' after the search'}
-    for source, label in (
-        (name, label) for name, label in sources.items() if (root / CHARTS / f'{name}.json').is_file()
-    ):
-        found = json.loads((root / CHARTS / f'{source}.json').read_text(encoding='utf-8'))['numbers']['regressors']
-        for regressor, figures in found.items():
-            published = numbers['paper'].get(regressor, {})
-            for kind in ('seen', 'unseen'):
-                figures_of_kind = figures[kind]
-                means = figures_of_kind.get('means', {})
-                cells = [
-                    f'{regressor}{label}',
-                    kind,
-                    f'{published[kind]:.2f}' if published else '–',
-                    plain(figures_of_kind.get('over_seeds', [figures_of_kind['error']])),
-                    plain(figures_of_kind.get('over_textures', []), middle=False),
-                    plain(means.get('error_none_as_0', [figures_of_kind['error_none_as_0']])),
-                    f'{100 * figures_of_kind["without_grade"]:.0f} %',
-                    f'{published[f"std_{kind}"]:.2f}' if published else '–',
-                    plain(means.get('std', [figures_of_kind['std']])),
-                ]
-                rows.append(f'| {" | ".join(cells)} |')
+    for regressor, figures in numbers['regressors'].items():
+        published = numbers['paper'].get(regressor, {})
+        for kind in ('seen', 'unseen'):
+            figures_of_kind = figures[kind]
+            means = figures_of_kind.get('means', {})
+            cells = [
+                regressor,
+                kind,
+                f'{published[kind]:.2f}' if published else '–',
+                plain(figures_of_kind.get('over_seeds', [figures_of_kind['error']])),
+                plain(figures_of_kind.get('over_textures', []), middle=False),
+                plain(means.get('error_none_as_0', [figures_of_kind['error_none_as_0']])),
+                f'{100 * figures_of_kind["without_grade"]:.0f} %',
+                f'{published[f"std_{kind}"]:.2f}' if published else '–',
+                plain(means.get('std', [figures_of_kind['std']])),
+            ]
+            rows.append(f'| {" | ".join(cells)} |')
     about = f'Mean absolute error in grades from 1 to 5. Data: {content["data"]}. Split: {content["split"]}.'
     person = f'One person differs from the mean of the others by {numbers["one_person"]:.2f} (another study).'
     return f'{about} {person}\n\n' + '\n'.join(rows) + '\n'
@@ -521,19 +515,7 @@ def stale() -> list[str]:
     ]
 
 
-def main() -> int:
-    """Write the pages, or check them."""
-    parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument('--check', action='store_true', help='compare only, and end with 1 if a page is not up to date')
-    if parser.parse_args().check:
-        found = stale()
-        print('\n'.join(found))
-        return int(bool(found))
+if __name__ == '__main__':
     FOLDER.mkdir(exist_ok=True)
     for path, text in made().items():
         path.write_text(text, encoding='utf-8')
-    return 0
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -7,11 +7,13 @@ import sys
 from pathlib import Path
 
 import pytest
+from rcl_interfaces.msg import ParameterType
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 from std_srvs.srv import Trigger
 
 from texture_bringup import operator as operators
 from texture_bringup.command import installed, main, summary
+from texture_core.errors import InvalidParameter
 from texture_core.ros_testing import LocalGraph
 
 pytestmark = pytest.mark.ros  # some sub-commands are nodes
@@ -165,9 +167,7 @@ class Fragile(LifecycleNode):
 
 
 @pytest.mark.realtime
-def test_nodes_are_activated_and_deactivated_over_the_states_between_and_a_refusal_is_reported(
-    asked, monkeypatch, capsys
-):
+def test_running_nodes_are_activated_and_deactivated_and_called_and_a_refusal_is_reported(asked, monkeypatch, capsys):
     monkeypatch.setenv('ROS_DOMAIN_ID', '97')
     with LocalGraph(97, deadline_s=60.0) as graph:
         node = graph.add(Fragile)
@@ -176,15 +176,29 @@ def test_nodes_are_activated_and_deactivated_over_the_states_between_and_a_refus
             assert capsys.readouterr().out == f'fragile: {state}\n'
         node.broken = True
         assert asked(graph, 'activate', 'fragile') == 2
-    assert "node 'fragile' is inactive and refuses to change" in capsys.readouterr().err
-
-
-@pytest.mark.realtime
-def test_the_answer_of_a_running_node_is_printed(asked, monkeypatch, capsys):
-    monkeypatch.setenv('ROS_DOMAIN_ID', '97')
-    with LocalGraph(97, deadline_s=60.0) as graph:
+        assert "node 'fragile' is inactive and refuses to change" in capsys.readouterr().err
         graph.peer.create_service(
             Trigger, 'explorer/recover', lambda _request, _answer: Trigger.Response(message='it burns')
         )
         assert asked(graph, 'recover') == 1
     assert capsys.readouterr().out == 'it burns\n'
+
+
+@pytest.mark.parametrize(
+    ('kind', 'text', 'value'),
+    [
+        (ParameterType.PARAMETER_BOOL, 'False', False),
+        (ParameterType.PARAMETER_INTEGER, '1', 1),
+        (ParameterType.PARAMETER_DOUBLE, '0', 0.0),  # which a node refuses as an integer
+        (ParameterType.PARAMETER_STRING, '12', '12'),
+        (ParameterType.PARAMETER_BOOL, 'no', "parameter 'x' is 'no'; allowed is true or false"),
+        (ParameterType.PARAMETER_DOUBLE, 'much', "parameter 'x' is 'much'; allowed is a number"),
+        (ParameterType.PARAMETER_DOUBLE_ARRAY, '1', "parameter 'x' is a list, which cannot be set from a text"),
+    ],
+)
+def test_a_text_is_read_as_the_type_that_the_node_declared_or_refused(kind, text, value):
+    try:
+        read = operators.parameter_from_text('x', text, kind).value
+    except InvalidParameter as error:
+        read = str(error)[: len(value)]
+    assert (read, type(read)) == (value, type(value))

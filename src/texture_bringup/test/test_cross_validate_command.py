@@ -40,26 +40,6 @@ def test_a_recipe_is_cross_validated_from_the_command_line(bags: Path, tmp_path:
     }
 
 
-@pytest.mark.parametrize(
-    ('split', 'sentence'),
-    [
-        ('stratified:5', 'has 4 slides, too few for 5 folds'),
-        ('folds:5', "no split 'folds'"),
-        ('leave-one-out:colour', 'leave one of speed, force'),
-    ],
-)
-def test_a_split_that_cannot_be_made_gets_one_sentence(split: str, sentence: str, bags: Path, capsys) -> None:
-    assert main(['cross-validate', split, 'default', str(bags)]) != 0
-    assert sentence in capsys.readouterr().err
-
-
-def test_a_recipe_without_its_stream_is_refused_before_any_other_is_computed(bags: Path, capsys) -> None:
-    assert main(['cross-validate', 'stratified:2', 'peaks-naive-bayes', 'two-fingers', str(bags)]) != 0
-    shown = capsys.readouterr()
-    assert "has no '" in shown.err
-    assert "cross-validate 'peaks-naive-bayes'" not in shown.err + shown.out
-
-
 @contextmanager
 def cluster(folder: Path, workers: int, *, with_suite: bool) -> Iterator[str]:
     """Run a Dask scheduler and workers as a user does, with the packages of the suite or without; give its address."""

@@ -10,7 +10,7 @@ import pytest
 from aiohttp.test_utils import TestClient, TestServer
 
 from texture_bringup import dashboard
-from texture_bringup.dashboard import BUTTONS, MAX_BODY_BYTES, VIEWERS, Access, Guesses, Serving, make_app
+from texture_bringup.dashboard import BUTTONS, MAX_BODY_BYTES, VIEWERS, Access, Guesses, Recorder, Serving, make_app
 from texture_core.errors import InvalidParameter, LaunchFailed, MotionRefused
 
 PAGE = Path(__file__).parents[1] / 'config' / 'dashboard'
@@ -203,6 +203,18 @@ def test_an_address_that_sends_wrong_tokens_waits_longer_after_each_and_one_and_
     with_client(story, Access('0.0.0.0', TOKEN, ('robot',)))
 
 
+@pytest.mark.parametrize('address', ['/', '/?token=always', '/api/motions?token=always'])
+def test_many_guesses_at_once_are_not_checked(address) -> None:
+    async def story(client, _nodes):
+        async def guess(number):
+            return (await client.get(address, headers={'Authorization': f'Bearer {number}'})).status
+
+        statuses = await asyncio.gather(*(guess(number) for number in range(200)))
+        assert (statuses.count(401), statuses.count(429)) == (6, 194)
+
+    with_client(story, Access('0.0.0.0', TOKEN, ('robot',)))
+
+
 @pytest.mark.parametrize(
     ('sent', 'answer'),
     [
@@ -234,3 +246,12 @@ def test_a_port_in_use_is_reported_and_nothing_is_left_running() -> None:
         first.show('{}')
     finally:
         first.close()
+
+
+def test_what_cannot_be_recorded_is_reported_and_nothing_is_left_to_end(tmp_path) -> None:
+    (tmp_path / 'file').touch()
+    recorder = Recorder(tmp_path / 'file', '/')
+    with pytest.raises(InvalidParameter, match='nothing can be recorded in'):
+        recorder.begin('now')
+    recorder.watch()
+    assert (recorder.bag, recorder.end()) == ('', 'nothing is being recorded')

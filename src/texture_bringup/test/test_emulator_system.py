@@ -142,7 +142,7 @@ def test_the_death_of_a_node_is_noticed_with_its_name_and_nothing_is_left(operat
     names = ('emulator', 'sensor', 'explorer', 'feature_extractor', 'classifier')
     assert set(pids) == {f'left/{name}' for name in (*names, 'roughness_features', 'roughness_estimator')}
     os.kill(pids['left/classifier'], signal.SIGKILL)
-    with pytest.raises(LaunchFailed, match='node left/classifier was killed by SIGKILL'):
+    with pytest.raises(LaunchFailed, match='the launch ended because left/classifier was killed by SIGKILL'):
         for _ in range(1000):
             operator.wait_for_signal(DEADLINE_S)
     assert not any(is_running(pid) for pid in pids.values())

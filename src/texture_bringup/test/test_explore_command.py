@@ -4,8 +4,10 @@
 
 import contextlib
 import math
+from types import SimpleNamespace
 from unittest.mock import MagicMock
 
+import numpy as np
 import pytest
 
 from texture_bringup.command import main
@@ -16,11 +18,14 @@ from texture_core.errors import ExplorationError, MotionAborted
 from texture_core.types import (
     ExplorationRequest,
     ExplorationState,
+    FeatureVector,
     Phase,
     Rejection,
     RoughnessEstimate,
+    SlideMotion,
     TextureEstimate,
 )
+from texture_estimation.next_motion import NextTouchModel
 from texture_features.correction import write_reference
 
 pytestmark = pytest.mark.ros
@@ -49,7 +54,7 @@ class EndingOperator:
 )
 def test_what_ended_an_exploration_stands_on_lines_of_its_own_below_the_progress(monkeypatch, capsys, error, lines):
     monkeypatch.setattr('sys.stderr.isatty', lambda: True)
-    run_program(lambda: explored(EndingOperator(error), ExplorationRequest('linear_slide')))
+    run_program(lambda: explored(EndingOperator(error).explore, ExplorationRequest('linear_slide')))
     progress, *below = capsys.readouterr().err.splitlines()
     assert progress.strip() == ''  # the terminal returns to the beginning of the line before it draws
     assert below[0].startswith('slide')
@@ -57,7 +62,7 @@ def test_what_ended_an_exploration_stands_on_lines_of_its_own_below_the_progress
 
 
 @pytest.mark.parametrize('last', ['aborted', 'refused', 'vanished'])
-def test_slides_in_several_directions_end_with_the_first_that_fails_and_tell_how_to_go_on(monkeypatch, capsys, last):
+def test_slides_in_several_directions_end_with_the_first_that_fails(monkeypatch, capsys, last):
     """Whatever aborted a slide, somebody has to look at it: an operator who is away must not find the finger worn."""
     nothing = TextureEstimate(0, ''), RoughnessEstimate(0, '')
     asked = []
@@ -81,7 +86,42 @@ def test_slides_in_several_directions_end_with_the_first_that_fails_and_tell_how
     monkeypatch.setattr('texture_bringup.commands.explore.Operator', FailingOperator)
     assert main(['explore', 'linear_slide', '--direction', '0', '180', '45.5', '180']) != 0
     assert asked == [0, 180, 46]
-    assert '2 of 4 slides were made; go on with --direction 45.5 180\n' in capsys.readouterr().err
+    assert '2 of 4 slides were made\n' in capsys.readouterr().err
+
+
+def test_identify_makes_the_slide_that_tells_textures_apart_until_one_is_decided(monkeypatch, capsys):
+    apart, alike = (SlideMotion('linear_slide', angle, 0.1, 2.0, 0.5) for angle in (0.0, math.pi / 4))
+    slides = [
+        (motion, texture, [10.0 * (motion is apart and texture == 'ridges_x') + wobble])
+        for motion in (apart, alike)
+        for texture in ('ridges_x', 'ridges_y')
+        for wobble in (-0.1, 0.1)
+    ]
+    motions, textures, values = zip(*slides, strict=True)
+    known = NextTouchModel.fit(np.array(values), textures, motions)
+    asked = []
+
+    class SlidingOperator(contextlib.nullcontext):
+        wait_for_explorer = staticmethod(lambda *_: None)
+
+        def __enter__(self):
+            return self
+
+        def explore_with_features(self, request, _on_progress):
+            asked.append(request.direction_rad)
+            ended = ExplorationResult(
+                ExplorationError.NONE, '', 'one', TextureEstimate(0, ''), RoughnessEstimate(0, '')
+            )
+            return ended, [FeatureVector(0, 'one', 0.5, 0.1, ('a',), np.array([10.0]), feature_set='kind')]
+
+    model = SimpleNamespace(name='m', next_touch_model=known, feature_set='kind')
+    monkeypatch.setattr('texture_bringup.commands.explore.load_model', lambda _path: model)
+    monkeypatch.setattr('texture_bringup.commands.explore.Operator', SlidingOperator)
+    assert main(['identify', 'm', '--sure', '0.9']) == 0
+    said = capsys.readouterr().out
+    assert said.startswith('slide 1: linear_slide, direction 0°, 0.1 m/s, 2 N, 0.5 s; ')
+    assert 'texture: ridges_x, probability ' in said
+    assert set(asked) == {0.0}
 
 
 @pytest.mark.parametrize(

@@ -31,18 +31,6 @@ REQUESTS = {
 SERVICE = re.compile(r"(?:create_service\([\w.]+, |_offer\()'([\w~/]+)'")
 SHOWN = {f'/views/{name}': kind for name, kind in VIEW_TYPES.items()}
 TYPES = {'/' + topic.name.lstrip('/'): topic.type for topic in TOPICS.values()} | SHOWN
-# What a panel must have besides its paths, by the configuration types of Lichtblick 1.28 and Foxglove.
-NEEDED = {
-    'Plot': {'paths', 'showLegend', 'legendDisplay', 'showXAxisLabels', 'showYAxisLabels', 'isSynced', 'xAxisVal',
-             'showPlotValuesInLegend', 'sidebarDimension'},
-    'StateTransitions': {'isSynced', 'paths'},
-    'Gauge': {'path', 'minValue', 'maxValue', 'colorMode', 'colorMap', 'gradient', 'reverse'},
-    'RawMessages': {'topicPath', 'diffEnabled', 'diffMethod', 'diffTopicPath', 'showFullMessageForDiff', 'fontSize'},
-    'DiagnosticSummary': {'topicToRender', 'minLevel', 'pinnedIds', 'hardwareIdFilter'},
-    '3D': {'cameraState', 'followMode', 'followTf', 'scene', 'publish', 'transforms', 'topics', 'layers', 'imageMode'},
-    'Image': {'cameraState', 'followMode', 'scene', 'publish', 'transforms', 'topics', 'layers', 'imageMode'},
-    'CallService': {'serviceName', 'requestPayload', 'layout', 'buttonText', 'buttonTooltip', 'buttonColor'},
-}  # fmt: skip
 
 
 def paths(config: Any) -> list[str]:
@@ -70,15 +58,6 @@ def test_a_panel_shows_fields_that_its_messages_have(panel: str) -> None:
 def test_all_is_shown_but_features_labels_and_the_signals_that_have_a_view() -> None:
     shown = {FIELD.fullmatch(path).group(1) for path in paths(VIEWS)}
     assert set(TYPES) - shown == {'/features', '/model_info', '/signal', '/signal_static'}
-
-
-@pytest.mark.parametrize('panel', PANELS)
-def test_a_panel_has_what_its_type_needs(panel: str) -> None:
-    config, kind = PANELS[panel], panel.partition('!')[0]
-    assert NEEDED[kind] <= set(config)
-    for path in config.get('paths', []):
-        assert {'value', 'timestampMethod'} <= set(path)
-        assert path['timestampMethod'] == 'headerStamp'
 
 
 @pytest.mark.parametrize('button', BUTTONS)

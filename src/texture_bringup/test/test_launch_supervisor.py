@@ -130,17 +130,6 @@ def test_a_node_that_had_to_be_killed_fails_the_launch_and_the_finger_is_named(l
     assert any('whether the finger still presses' in line for line in launched.lines)
 
 
-def test_a_python_node_that_is_still_importing_ends_without_a_traceback(launch) -> None:
-    # Python handles SIGINT from its start by an exception, and SIGTERM not at all: as it is while a node imports.
-    program = 'import time; print("ready 1", flush=True); time.sleep(60)'
-    launched = launch({'importing': f"exec {sys.executable} -c '{program}'"})
-    launched.ready()
-    launched.process.send_signal(signal.SIGINT)
-    launched.end()
-    assert not [line for line in launched.lines if 'Traceback' in line or 'KeyboardInterrupt' in line]
-    assert any('importing was ended while it started' in line for line in launched.lines)
-
-
 def test_a_node_that_dies_is_named_with_its_code_and_the_others_go_on(launch) -> None:
     launched = launch({'good': GOOD, 'bad': 'exit 3'})
     launched.wait_for('bad died with exit code 3')
@@ -149,18 +138,22 @@ def test_a_node_that_dies_is_named_with_its_code_and_the_others_go_on(launch) ->
     assert launched.end() == 1
 
 
-def test_the_death_of_a_needed_node_stops_the_others(launch) -> None:
-    launched = launch({'good': GOOD, 'bad': 'echo no disk; exit 3'}, bad='on_exit="shutdown"')
-    assert launched.end() == 1
-    assert any('bad is required' in line for line in launched.lines)
-    assert launched.lines[-1] == '[launch] the launch ended because bad died with exit code 3: no disk'
-
-
-def test_a_node_killed_by_a_signal_is_named_with_it(launch) -> None:
-    launched = launch({'victim': GOOD})
-    os.kill(launched.ready(), signal.SIGKILL)
-    assert launched.end() == 1
-    assert '[launch] victim was killed by SIGKILL' in launched.lines
+@pytest.mark.parametrize(
+    ('script', 'attributes', 'expected', 'cause'),
+    [
+        ('exit 3', 'on_exit="shutdown"', (1, 1), 'died with exit code 3: why'),
+        ('kill -9 $$', 'on_exit="shutdown"', (1, 1), 'was killed by SIGKILL: why'),
+        ('exit 3', 'respawn="true" respawn_max_retries="2"', (1, 3), 'died with exit code 3: why'),
+        ('exit 2', 'respawn="true"', (2, 1), 'died with exit code 2: why'),  # was started wrongly
+    ],
+)
+def test_the_death_of_a_needed_node_stops_the_others_and_is_named_last(
+    launch, script, attributes, expected, cause
+) -> None:
+    launched = launch({'good': GOOD, 'bad': f'echo why; {script}'}, bad=attributes)
+    assert (launched.end(), launched.lines.count('[bad] why')) == expected
+    assert '[launch] bad is required by the other nodes, which are stopped now' in launched.lines
+    assert launched.lines[-1] == f'[launch] the launch ended because bad {cause}'
 
 
 def test_a_node_that_may_be_restarted_comes_back(launch) -> None:
@@ -173,13 +166,6 @@ def test_a_node_that_may_be_restarted_comes_back(launch) -> None:
     assert launched.end() == 0
 
 
-def test_a_node_that_dies_more_often_than_it_may_be_restarted_stops_the_others(launch) -> None:
-    again = 'respawn="true" respawn_max_retries="2"'
-    launched = launch({'good': GOOD, 'mortal': 'echo born; exit 3'}, mortal=again)
-    assert launched.end() == 1
-    assert launched.lines.count('[mortal] born') == 3
-
-
 @pytest.mark.parametrize(('given', 'again'), [('', 'restart.xml'), ('/mine.xml', 'mine.xml')])
 def test_a_node_in_the_place_of_a_dead_one_gets_the_profile_for_restarts(launch, monkeypatch, given, again) -> None:
     monkeypatch.setenv('FASTRTPS_DEFAULT_PROFILES_FILE', given)
@@ -190,13 +176,6 @@ def test_a_node_in_the_place_of_a_dead_one_gets_the_profile_for_restarts(launch,
         os.kill(launched.ready(), signal.SIGKILL)
     assert profiles[0] == given
     assert Path(profiles[1]).name == again
-
-
-def test_a_node_that_was_started_wrongly_is_not_restarted_and_stops_the_others(launch) -> None:
-    launched = launch({'good': GOOD, 'wrong': 'echo why; exit 2'}, wrong='respawn="true"')
-    assert launched.end() == 1
-    assert launched.lines.count('[wrong] why') == 1
-    assert any('wrong is required' in line for line in launched.lines)
 
 
 def test_together_the_death_of_any_node_stops_all_and_none_is_restarted(launch) -> None:

@@ -31,6 +31,13 @@ def data(tmp_path_factory):
     return folder
 
 
+def test_a_model_is_described_by_its_labels_and_topics(data, capsys) -> None:
+    assert main(['info', str(data / 'all')]) == 0
+    said = capsys.readouterr().out
+    assert 'trained on 2 surfaces: glass, leather' in said
+    assert 'topics: signal, signal_static' in said
+
+
 def changed(source, target, change):
     """Write a bag with what `change(topic, value)` returns for each message; None leaves it out."""
     with BagWriter(target) as bag:
@@ -97,7 +104,10 @@ def test_a_model_that_needs_the_slow_channels_refuses_a_bag_without_them(data, c
         ('train roughness glass leather -o x', 'give them with --grades'),
         ('evaluate fast glass --json /proc/none/x.json', '/proc/none'),
         ('cross-validate stratified:x default glass', 'write stratified:FOLDS (2 or more)'),
-        ('cross-validate stratified:1 default glass', 'write stratified:FOLDS (2 or more)'),
+        ('cross-validate stratified:5 default glass leather', 'has 3 slides, too few for 5 folds'),
+        ('cross-validate folds:5 default glass', "no split 'folds'"),
+        ('cross-validate leave-one-out:colour default glass', 'leave one of speed, force'),
+        ('cross-validate stratified:2 default two-fingers glass leather', "has no '"),
         ('cross-validate leave-one-out:speed default glass leather', "all are of one group, '0.05'"),
         ('train default glass leather -o fast', "'fast.npz' exists; give another name, or --force to replace it"),
         ('train default glass leather -o no/x', "there is no folder 'no' for the model"),
@@ -117,19 +127,18 @@ def test_a_model_that_needs_the_slow_channels_refuses_a_bag_without_them(data, c
         ('launch emulator surfcae:=glass', "did you mean 'surface'?"),
         ('launch emulator surface', 'write NAME:=VALUE'),
         ('launch emulator surface:=glas', "no surface 'glas'; did you mean 'glass'?"),
+        ('launch emulator recipe:=defualt', "did you mean 'default'?"),
         ('launch emulator model:=nowhere', "there is no model 'nowhere'"),
         ('launch emulator model:=pipe', "argument 'model' is 'pipe', which is neither a regular file"),
         ('launch replay', 'give bag:=VALUE'),
         ('launch replay bag:=nowhere', "there is no bag 'nowhere'"),
-        ('replay glass --rate nan', '--rate is nan; allowed is 0.01 to 1000.0'),
+        ('replay glass --rate nan', "parameter 'rate' is nan; allowed is 0.01 to 1000.0"),
         ('list sensor', "did you mean 'sensors'?"),
         ('info nowhere', "there is no bag 'nowhere'"),
-        ('watch glass --rate 0', '--rate is 0; a number above 0 is needed'),
         ('import tabel map.yaml . out', "did you mean 'table'?"),
         ('demo --recipe defualt', "did you mean 'default'?"),
         ('dashboard --port 99999', 'allowed is 0 to 65535'),
         ('import biotac . .', 'biotac20'),
-        ('import table map.yaml . out --slides 1', 'of table the mapping file says what is read'),
     ],
 )
 def test_what_is_missing_or_mistyped_is_named(command, sentence, data, capsys, monkeypatch) -> None:

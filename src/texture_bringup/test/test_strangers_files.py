@@ -372,22 +372,6 @@ def changed_card(**changes: Any) -> Callable[[Path], bytes]:
     return lambda folder: json.dumps({**json.loads((folder / CARD).read_text()), **changes}).encode()
 
 
-def changed_metadata(**changes: Any) -> Callable[[Path], bytes]:
-    def make(folder: Path) -> bytes:
-        facts = yaml.safe_load((folder / 'bag/metadata.yaml').read_text())
-        facts['rosbag2_bagfile_information'].update(changes)
-        return yaml.safe_dump(facts).encode()
-
-    return make
-
-
-def pickled_array(folder: Path) -> bytes:
-    """Return an array of objects, which NumPy stores as a pickle."""
-    packed = io.BytesIO()
-    np.lib.format.write_array(packed, np.array([Trap(folder / 'trapped')], dtype=object), allow_pickle=True)
-    return packed.getvalue()
-
-
 def pickle_among_arrays(folder: Path) -> bytes:
     packed = io.BytesIO()
     np.savez(packed, **{'parameters/hidden': np.array([Trap(folder / 'trapped')], dtype=object)})
@@ -398,9 +382,6 @@ def recipe(**changes: Any) -> dict[str, Any]:
     return {'inputs': {'signal': {'features': ['hjorth']}}, **changes}
 
 
-LAUGHS = 'a: &a [x, x, x, x, x, x, x, x, x]\n' + ''.join(
-    f'{b}: &{b} [{", ".join([f"*{a}"] * 9)}]\n' for a, b in zip('abcdefghi', 'bcdefghij', strict=True)
-)
 # Reader, file, and what is written there: a text, or what makes it from the folder.
 HARM: dict[str, tuple[str, str, str | Callable[[Path], bytes]]] = {
     'a pickle called model': ('model', MODEL, lambda folder: pickle.dumps(Trap(folder / 'trapped'))),
@@ -408,15 +389,6 @@ HARM: dict[str, tuple[str, str, str | Callable[[Path], bytes]]] = {
     'a deep card': ('model', CARD, '{"format": 1, "recipe": {"inputs": ' + '[' * 900 + ']' * 900 + '}}'),
     'a card that names a program': ('model', CARD, changed_card(recipe=recipe(learner='antigravity:fly'))),
     'an added slide as deep as can be': ('model', EXAMPLE, '{"values": ' + '[' * 100_000),
-    'a recipe that multiplies': ('recipe', 'good.yaml', LAUGHS + 'inputs: *j'),
-    'a scene that multiplies': ('scene', 'good.yaml', LAUGHS + 'surfaces: {x: *j}'),
-    'a scene that runs a program': ('scene', 'good.yaml', '!!python/object/apply:os.mkdir [trapped]'),
-    'a bag compressed as a whole': (
-        'bag',
-        'bag/metadata.yaml',
-        changed_metadata(compression_format='zstd', compression_mode='FILE'),
-    ),
-    'an array file with a pickle': ('recording npy', 'good.npy', pickled_array),
 }
 
 

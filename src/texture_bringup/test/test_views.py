@@ -54,16 +54,14 @@ def test_a_stronger_vibration_has_a_brighter_colour():
 
 
 @pytest.mark.realtime
-def test_each_view_comes_to_who_looks_and_costs_nothing_while_nobody_does():
+def test_each_view_comes_to_who_looks():
     with LocalGraph(73, deadline_s=60.0) as graph:
         views = graph.add(Views)
-        listened = ('signal', 'signal_static', 'signal_wrench', 'exploration')
-        assert not any(views.count_subscribers(topic) for topic in listened)
         drawn = graph.listen(msg.SignalSample, 'views/signal')
         images = graph.listen(Image, 'views/taxels')
         wrenches = graph.listen(WrenchStamped, 'views/wrench')
         paths = graph.listen(Marker, 'views/path')
-        graph.until(lambda: all(views.count_subscribers(topic) for topic in listened))
+        graph.until(lambda: views.count_subscribers('views/path'))
         publish = {
             topic: graph.peer.create_publisher(msg.TactileSignal, topic, SENSOR_QOS)
             for topic in ('signal', 'signal_static', 'signal_wrench')

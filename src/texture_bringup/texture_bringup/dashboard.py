@@ -256,8 +256,8 @@ BUSY: web.AppKey[set[Any]] = web.AppKey('busy', set)  # connections whose reques
 def make_app(commands: Any, access: Access, page: Path) -> web.Application:
     """Return the application, which is not started yet."""
     app = web.Application(middlewares=[_guard(access)], client_max_size=MAX_BODY_BYTES)
-    viewers, app[BUSY] = Viewers(), set()
-    app[VIEWERS] = viewers
+    viewers = app[VIEWERS] = Viewers()
+    app[BUSY] = set()
 
     async def motions(_request: web.Request) -> web.StreamResponse:
         return web.json_response(await commands.offered())
@@ -322,7 +322,7 @@ def _refusal(access: Access, guesses: Guesses, request: web.Request) -> web.Stre
     carried = request.cookies.get(COOKIE, '') or request.headers.get('Authorization', '').removeprefix('Bearer ')
     if not access.knows(carried):
         if given or carried:
-            guesses.note(address, given or carried)
+            guesses.note(address, f'{given} {carried}')  # both were checked
         return _failure(401, 'this page needs its token: open the address that the dashboard printed, with ?token=')
     return None
 
@@ -364,14 +364,17 @@ class Serving:
     def __init__(self, app: web.Application, host: str, port: int) -> None:
         self._app = app
         self._loop = asyncio.new_event_loop()
-        self._runner = web.AppRunner(app, shutdown_timeout=1.0, access_log=None)
+        self._closing = asyncio.Event()
         self._started: concurrent.futures.Future[int] = concurrent.futures.Future()
-        self._thread = threading.Thread(target=self._serve, args=(host, port), name='web server')
+        self._thread = threading.Thread(
+            target=self._loop.run_until_complete, args=(self._serve(host, port),), name='web server'
+        )
         self._thread.start()
         try:
             self.port = self._started.result()
         except OSError as error:
             self._thread.join()
+            self._loop.close()
             raise LaunchFailed(
                 f"the dashboard cannot listen on '{host}' port {port}: {error.strerror or error}; "
                 'choose another host or port'
@@ -388,38 +391,32 @@ class Serving:
 
     def close(self) -> None:
         """Close all connections, and join the thread."""
-        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._loop.call_soon_threadsafe(self._closing.set)
         self._thread.join(SERVING_CLOSING_S)
-
-    def _serve(self, host: str, port: int) -> None:
-        asyncio.set_event_loop(self._loop)
-        try:
-            self._started.set_result(self._loop.run_until_complete(self._start(host, port)))
-        except OSError as error:
-            self._loop.run_until_complete(self._runner.cleanup())
-            self._loop.close()
-            self._started.set_exception(error)
-            return
-        closing = self._loop.create_task(self._close_silent())
-        self._loop.run_forever()
-        closing.cancel()
-        self._loop.run_until_complete(self._runner.cleanup())
         self._loop.close()
 
-    async def _close_silent(self) -> None:
+    async def _serve(self, host: str, port: int) -> None:
+        runner = web.AppRunner(self._app, shutdown_timeout=1.0, access_log=None)
+        await runner.setup()
+        try:
+            await web.TCPSite(runner, host, port).start()
+            self._started.set_result(int(runner.addresses[0][1]))
+            silent = self._loop.create_task(self._close_silent(runner))
+            await self._closing.wait()
+            silent.cancel()
+        except OSError as error:
+            self._started.set_exception(error)
+        finally:
+            await runner.cleanup()
+
+    async def _close_silent(self, runner: web.AppRunner) -> None:
         """Close each connection whose next request does not come in time."""
         since_s: dict[Any, float] = {}
         while True:
             await asyncio.sleep(LOOK_S)
-            now_s, server = self._loop.time(), self._runner.server
+            now_s, server = self._loop.time(), runner.server
             waiting = [one for one in (server.connections if server else ()) if one not in self._app[BUSY]]
             since_s = {one: since_s.get(one, now_s) for one in waiting}
             for one, begun_s in since_s.items():
                 if now_s - begun_s > REQUEST_S:
                     one.force_close()
-
-    async def _start(self, host: str, port: int) -> int:
-        await self._runner.setup()
-        site = web.TCPSite(self._runner, host, port)
-        await site.start()
-        return int(self._runner.addresses[0][1])

@@ -8,21 +8,18 @@ import contextlib
 import os
 import shutil
 import socket
-import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 
 from texture_bringup.launcher import ChildLauncher
 from texture_bringup.operator import ExplorationResult, Operator
-from texture_core.config import write_json
-from texture_core.errors import ExplorationError, InvalidData, LaunchFailed, MotionAborted
+from texture_core.errors import ExplorationError, InvalidData, LaunchFailed
 from texture_core.types import ExplorationRequest, Rejection, TextureEstimate
 from texture_evaluation.charts import COLOURS, chart
 from texture_evaluation.train import train_from_bags, train_grades_from_bags
@@ -74,51 +71,26 @@ def _free_port() -> int:
 # --------------------
 # What the demonstration explores, and how.
 
-
-@dataclass(frozen=True)
-class DemoPlan:
-    """Surfaces of the scene `twelve_textures` with made-up grades of roughness, and the slide over each."""
-
-    trained: Mapping[str, float] = field(
-        default_factory=lambda: {
-            'glass': 1.0,
-            'leather': 2.0,
-            'woven_cloth': 2.5,
-            'grid_2mm': 3.0,
-            'ridge_1mm': 3.0,
-            'sandpaper_fine': 3.5,
-            'ridge_2mm_shallow': 4.0,
-            'ridge_2mm_deep': 4.5,
-        }
-    )
-    recognised: tuple[str, ...] = ('glass', 'leather', 'woven_cloth', 'ridge_2mm_deep')
-    untrained: tuple[str, ...] = ('cardboard', 'ridge_3mm')
-    training_slides: int = 40  # enough that a slide may end early: 299 must be held out to show 1 % wrong decisions
-    speed_m_s: float = 0.05
-    force_n: float = 1.0
-    distance_m: float = 0.06
-    untrained_speed_m_s: float = 0.02
-    edge_m: float = 0.08  # where the sample ends
-
-    def request(self, surface: str, speed_m_s: float = 0.0) -> ExplorationRequest:
-        """Return a slide over a surface, at the speed of the training unless another is given, and as long in time."""
-        speed_m_s = speed_m_s or self.speed_m_s
-        return ExplorationRequest(
-            'linear_slide',
-            speed_m_s=speed_m_s,
-            force_n=self.force_n,
-            distance_m=self.distance_m * speed_m_s / self.speed_m_s,
-            surface=surface,
-            early_stopping=True,
-        )
-
-    def over_the_edge(self, surface: str) -> ExplorationRequest:
-        """Return a slide that is longer than the sample."""
-        return replace(self.request(surface), distance_m=1.5 * self.edge_m, early_stopping=False)
-
-
+# Surfaces of the scene `twelve_textures`, with made-up grades of roughness.
+TRAINED = {
+    'glass': 1.0,
+    'leather': 2.0,
+    'woven_cloth': 2.5,
+    'grid_2mm': 3.0,
+    'ridge_1mm': 3.0,
+    'sandpaper_fine': 3.5,
+    'ridge_2mm_shallow': 4.0,
+    'ridge_2mm_deep': 4.5,
+}
+RECOGNISED = ('glass', 'leather', 'woven_cloth', 'ridge_2mm_deep')
+UNTRAINED = ('cardboard', 'ridge_3mm')
+TRAINING_SLIDES = 40  # enough that a slide may end early: 299 must be held out to show 1 % wrong decisions
+SPEED_M_S, FORCE_N, DISTANCE_M = 0.05, 1.0, 0.06
+UNTRAINED_SPEED_M_S = 0.02
+EDGE_M = 0.08  # where the sample ends
 ACCEPTED, UNKNOWN = frozenset({Rejection.NONE}), frozenset({Rejection.NOVEL, Rejection.AMBIGUOUS})
 OUTSIDE = frozenset({Rejection.OUTSIDE_TRAINING})
+LOST: frozenset[Rejection] = frozenset()  # of the contact
 
 
 @dataclass(frozen=True)
@@ -132,22 +104,27 @@ class Slide:
     estimates: Sequence[TextureEstimate]
 
     @property
+    def ended(self) -> bool:
+        """Whether the motion ended as expected."""
+        return self.answer.error is (ExplorationError.NONE if self.expected else ExplorationError.MOTION_FAILED)
+
+    @property
     def as_expected(self) -> bool:
         """Whether the answer is the right one."""
-        if not self.expected:
-            return self.answer.error is ExplorationError.MOTION_FAILED
+        if not (self.ended and self.expected):
+            return self.ended
         right = self.answer.texture.label == self.surface or self.expected != ACCEPTED
-        return self.answer.success and self.answer.texture.rejection in self.expected and right
+        return self.answer.texture.rejection in self.expected and right
 
     @property
     def outcome(self) -> str:
         """The result as a short text."""
         estimate, roughness = self.answer.texture, self.answer.roughness
-        if not self.expected:
+        if not self.answer.success:
             return self.answer.message
+        if estimate.rejection is Rejection.OUTSIDE_TRAINING:
+            return f'rejected, {estimate.message}'
         if estimate.rejection is not Rejection.NONE:
-            if estimate.rejection is Rejection.OUTSIDE_TRAINING:
-                return f'rejected, {estimate.message}'
             return f'rejected, {estimate.rejection.name.lower().replace("_", " ")} (nearest: {estimate.label})'
         grade = f'; roughness {roughness.grade:.1f} of 5' if roughness.valid else ''
         early = ', ended early' if estimate.decided else ''
@@ -161,88 +138,23 @@ class Slide:
 class ProgressLog:
     """Print the progress, each section with the time since the start."""
 
-    def __init__(self, out: TextIO = sys.stdout) -> None:
-        self._out = out
+    def __init__(self) -> None:
         self._start_s = time.monotonic()
 
     def section(self, text: str) -> None:
         """Begin something new."""
-        print(f'\n[{time.monotonic() - self._start_s:3.0f} s]  {text}', file=self._out, flush=True)
+        print(f'\n[{time.monotonic() - self._start_s:3.0f} s]  {text}', flush=True)
 
     def line(self, text: str) -> None:
         """Print a line within the section."""
-        print(f'{" " * 8}{text}', file=self._out, flush=True)
-
-
-# --------------------
-# The emulator of the demonstration: its processes, and what the operator does with it.
-
-START_DEADLINE_S = 60.0  # a slow machine that imports everything for the first time
-ATTEMPTS = 3  # a machine that is busy with something else delays the emulated arm, and the explorer aborts
-
-
-class DemoRig:
-    """Run the emulator and the real nodes in a separate ROS domain; use it in a `with` block."""
-
-    def __init__(self, folder: Path, log: Path, arguments: Mapping[str, Any]) -> None:
-        domain_id = free_domain()
-        environment = isolated(domain_id, {**os.environ, 'ROS_LOG_DIR': str(folder / 'ros_log')})
-        self._launcher = ChildLauncher('emulator', {'devices': folder, **arguments}, environment, log)
-        self._operator = Operator(domain_id=domain_id, guard=self._launcher.check)
-        self._open = ExitStack()
-
-    def __enter__(self) -> DemoRig:
-        with ExitStack() as opening:
-            opening.enter_context(self._launcher)
-            opening.enter_context(self._operator)
-            self._operator.wait_for_explorer(START_DEADLINE_S)
-            self._operator.wait_for_signal(START_DEADLINE_S)
-            self._open = opening.pop_all()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._open.close()
-
-    def set_parameters(self, node: str, **values: object) -> None:
-        """Set parameters of a node."""
-        self._operator.set_parameters(node, values)
-
-    def explore(
-        self, request: ExplorationRequest, report: Callable[[str], None], ends: ExplorationError = ExplorationError.NONE
-    ) -> tuple[ExplorationResult, list[TextureEstimate]]:
-        """Put the surface of a request under the finger and slide; return the answer and the estimates on the way."""
-        self.set_parameters('emulator', surface=request.surface)
-        estimates: list[TextureEstimate] = []
-
-        def explore(wanted: ExplorationRequest) -> ExplorationResult:
-            estimates.clear()
-            return self._operator.explore(wanted, lambda _state, texture: estimates.append(texture))
-
-        return explore_with_retries(explore, request, report, ends), estimates
-
-
-def explore_with_retries(
-    explore: Callable[[ExplorationRequest], ExplorationResult],
-    request: ExplorationRequest,
-    report: Callable[[str], None],
-    ends: ExplorationError = ExplorationError.NONE,
-) -> ExplorationResult:
-    """Return the result of an exploration; one that ends in another way is made again, twice at most."""
-    for left in reversed(range(ATTEMPTS)):
-        explored = explore(request)
-        if explored.error is ends:
-            break
-        if not left:
-            raise MotionAborted(f'the exploration of {request.surface} failed: {explored.message}')
-        report(f'aborted: {explored.message}; trying again')
-    return explored
+        print(f'{" " * 8}{text}', flush=True)
 
 
 # --------------------
 # The demonstration from beginning to end.
 
 TRAINING, MODEL, ROUGHNESS = 'training', 'model', 'roughness'  # in the folder of the results
-PICTURE, FIGURES, LOG, GRADES = 'demo.png', 'demo.json', 'nodes.log', 'grades.csv'
+PICTURE, LOG, GRADES = 'demo.png', 'nodes.log', 'grades.csv'
 
 
 def _clear(folder: Path) -> None:
@@ -251,102 +163,127 @@ def _clear(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         shutil.rmtree(folder / TRAINING, ignore_errors=True)
         models = (f'{name}{ending}' for name in (MODEL, ROUGHNESS) for ending in ('.npz', '.json'))
-        for file in (PICTURE, FIGURES, LOG, GRADES, *models):
+        for file in (PICTURE, LOG, GRADES, *models):
             (folder / file).unlink(missing_ok=True)
     except OSError as error:
         raise InvalidData(f"'{folder}' cannot be used: {error.strerror}; name another with --out") from error
 
 
-def demonstrate(
-    out: Path, recipe: str, seed: int, plan: DemoPlan, progress: ProgressLog, *, dashboard: bool = False
-) -> bool:
+START_DEADLINE_S = 60.0  # a slow machine that imports everything for the first time
+ATTEMPTS = 3  # a machine that is busy with something else delays the emulated arm, and the explorer aborts
+
+
+def demonstrate(out: Path, recipe: str, seed: int, progress: ProgressLog, *, dashboard: bool = False) -> bool:
     """Train, recognise and reject on the emulator, and report; return whether every answer was as expected."""
     _clear(out)
-    _train(out, recipe, seed, plan, progress)
+    _train(out, recipe, seed, progress)
     progress.section('Starting the emulator: surfaces, arm and sensor are simulated, all other nodes are the real ones')
-    arguments: dict[str, Any] = {
-        'recipe': (out / f'{MODEL}.json').resolve(),
-        'model': (out / f'{MODEL}.npz').resolve(),
-        'roughness_model': (out / f'{ROUGHNESS}.json').resolve(),
-        'seed': seed + 1,
-    }
-    if dashboard:
-        arguments |= {'dashboard': 'true', 'dashboard_port': _free_port()}
-    with tempfile.TemporaryDirectory(prefix='texture_demo_') as folder:
-        parameters = Path(folder) / 'explorer.yaml'
-        parameters.write_text(f'/**/explorer: {{ros__parameters: {{edge_m: {plan.edge_m}}}}}\n')
-        arguments['explorer_params'] = parameters
-        with DemoRig(Path(folder), out / LOG, arguments) as rig:
+    with tempfile.TemporaryDirectory(prefix='texture_demo_') as name:
+        folder = Path(name)
+        (folder / 'explorer.yaml').write_text(f'/**/explorer: {{ros__parameters: {{edge_m: {EDGE_M}}}}}\n')
+        arguments: dict[str, Any] = {
+            'devices': folder,
+            'explorer_params': folder / 'explorer.yaml',
+            'recipe': (out / f'{MODEL}.json').resolve(),
+            'model': (out / f'{MODEL}.npz').resolve(),
+            'roughness_model': (out / f'{ROUGHNESS}.json').resolve(),
+            'seed': seed + 1,
+        }
+        if dashboard:
+            arguments |= {'dashboard': 'true', 'dashboard_port': _free_port()}
+        domain_id = free_domain()
+        environment = isolated(domain_id, {**os.environ, 'ROS_LOG_DIR': str(folder / 'ros_log')})
+        with (
+            ChildLauncher('emulator', arguments, environment, out / LOG) as launcher,
+            Operator(domain_id=domain_id, guard=launcher.check) as operator,
+        ):
+            operator.wait_for_explorer(START_DEADLINE_S)
+            operator.wait_for_signal(START_DEADLINE_S)
             if dashboard:
+                operator.wait_for_node('dashboard', START_DEADLINE_S)
                 progress.line(f'dashboard: http://127.0.0.1:{arguments["dashboard_port"]} while this runs')
-            slides = _explore(rig, plan, progress)
+            slides = _explore(operator, progress)
     _report(slides, out, progress)
     return all(slide.as_expected for slide in slides)
 
 
-def _train(out: Path, recipe: str, seed: int, plan: DemoPlan, progress: ProgressLog) -> None:
+def _train(out: Path, recipe: str, seed: int, progress: ProgressLog) -> None:
     """Simulate a session of slides over each surface, and train both models on them."""
-    progress.section(f'Simulating {plan.training_slides} slides over each of {len(plan.trained)} surfaces')
-    slides = SlidePlan(plan.training_slides, plan.speed_m_s, plan.force_n, plan.distance_m / plan.speed_m_s)
-    bags = write_simulated(out / TRAINING, slides, np.random.default_rng(seed), surfaces=tuple(plan.trained))
+    progress.section(f'Simulating {TRAINING_SLIDES} slides over each of {len(TRAINED)} surfaces')
+    slides = SlidePlan(TRAINING_SLIDES, SPEED_M_S, FORCE_N, DISTANCE_M / SPEED_M_S)
+    bags = write_simulated(out / TRAINING, slides, np.random.default_rng(seed), surfaces=tuple(TRAINED))
     progress.section('Training a texture model and a roughness model (as `texture train` does)')
     model = train_from_bags(recipe, bags, out=out / MODEL)
-    rows = [f'{surface},{grade}' for surface, grade in plan.trained.items()]
+    rows = [f'{surface},{grade}' for surface, grade in TRAINED.items()]
     (out / GRADES).write_text('\n'.join(['texture,grade', *rows, '']))
     train_grades_from_bags('roughness', bags, out / GRADES, out=out / ROUGHNESS)
     reasons = (model.acceptance.reason, model.acceptance.decided_reason)
-    progress.line(f'trained on {len(plan.trained)} surfaces: {", ".join(plan.trained)}')
+    progress.line(f'trained on {len(TRAINED)} surfaces: {", ".join(TRAINED)}')
     for reason in filter(None, reasons):
         progress.line(reason)
 
 
-def _explore(rig: DemoRig, plan: DemoPlan, progress: ProgressLog) -> list[Slide]:
+def _explore(operator: Operator, progress: ProgressLog) -> list[Slide]:
     """Make all slides, and print what was answered to each."""
     slides: list[Slide] = []
 
-    def slide(request: ExplorationRequest, title: str, expected: frozenset[Rejection]) -> None:
-        ends = ExplorationError.NONE if expected else ExplorationError.MOTION_FAILED
-        made = Slide(request.surface, title, expected, *rig.explore(request, progress.line, ends))
-        if expected == ACCEPTED and made.answer.texture.rejection is not Rejection.NONE:
-            # By its calibration the model rejects one slide in 25 over trained surfaces.
-            progress.line(f'· {title:<28}{made.outcome}; trying again')
-            made = Slide(request.surface, title, expected, *rig.explore(request, progress.line, ends))
-        slides.append(made)
-        progress.line(f'{"✓" if made.as_expected else "✗"} {title:<28}{made.outcome}')
+    def slide(surface: str, title: str, expected: frozenset[Rejection], **changes: Any) -> None:
+        usual = ExplorationRequest(
+            'linear_slide',
+            speed_m_s=SPEED_M_S,
+            force_n=FORCE_N,
+            distance_m=DISTANCE_M,
+            surface=surface,
+            early_stopping=True,
+        )
+        slides.append(slide_over(operator, replace(usual, **changes), title, expected, progress))
+        progress.line(f'{"✓" if slides[-1].as_expected else "✗"} {title:<28}{slides[-1].outcome}')
 
     progress.section('Trained surfaces: a slide ends as soon as the evidence is enough')
-    for surface in plan.recognised:
-        slide(plan.request(surface), surface, ACCEPTED)
+    for surface in RECOGNISED:
+        slide(surface, surface, ACCEPTED)
     progress.section('Surfaces that were never trained')
-    for surface in plan.untrained:
-        slide(plan.request(surface), surface, UNKNOWN)
+    for surface in UNTRAINED:
+        slide(surface, surface, UNKNOWN)
     progress.section('A speed that was not trained, and a slide over the edge of the sample')
-    shown, speed_m_s = plan.recognised[-1], plan.untrained_speed_m_s
-    slide(plan.request(shown, speed_m_s), f'{shown} at {speed_m_s:g} m/s', OUTSIDE)
-    slide(plan.over_the_edge(shown), 'over the edge', frozenset())
+    shown, speed_m_s = RECOGNISED[-1], UNTRAINED_SPEED_M_S
+    as_long = DISTANCE_M * speed_m_s / SPEED_M_S  # in time
+    slide(shown, f'{shown} at {speed_m_s:g} m/s', OUTSIDE, speed_m_s=speed_m_s, distance_m=as_long)
+    slide(shown, 'over the edge', LOST, distance_m=1.5 * EDGE_M, early_stopping=False)
     return slides
 
 
+def slide_over(
+    operator: Operator,
+    request: ExplorationRequest,
+    title: str,
+    expected: frozenset[Rejection],
+    progress: ProgressLog,
+) -> Slide:
+    """Put the surface of a request under the finger and slide.
+
+    A slide that is aborted, or rejected over a trained surface, is made again, twice at most: by its calibration the
+    model rejects one slide in 25.
+    """
+    operator.set_parameters('emulator', {'surface': request.surface})
+    estimates: list[TextureEstimate] = []
+    for left in reversed(range(ATTEMPTS)):
+        estimates.clear()
+        answer = operator.explore(request, lambda _state, texture: estimates.append(texture))
+        made = Slide(request.surface, title, expected, answer, estimates)
+        rejected = expected == ACCEPTED and answer.texture.rejection is not Rejection.NONE
+        if not left or (made.ended and not rejected):
+            break
+        progress.line(f'· {title:<28}{made.outcome}; trying again')
+    return made
+
+
 def _report(slides: Sequence[Slide], out: Path, progress: ProgressLog) -> None:
-    """Store the answers and draw the picture."""
-    figures = [
-        {
-            'surface': slide.surface,
-            'title': slide.title,
-            'as_expected': slide.as_expected,
-            'outcome': slide.outcome,
-            'label': slide.answer.texture.label,
-            'rejection': slide.answer.texture.rejection.name,
-            'decided': slide.answer.texture.decided,
-            'evidence_s': slide.answer.texture.evidence_s,
-        }
-        for slide in slides
-    ]
-    write_json({'slides': figures}, out / FIGURES)
+    """Draw the picture, and count the answers that are right."""
     draw([slide for slide in slides if slide.expected], out / PICTURE)
     right = sum(slide.as_expected for slide in slides)
     progress.section(f'Done: {right} of {len(slides)} results as expected. Look at {out / PICTURE}')
-    progress.line(f'training slides, models, answers and the log of the nodes are in {out}/')
+    progress.line(f'training slides, models and the log of the nodes are in {out}/')
 
 
 def draw(slides: Sequence[Slide], path: Path) -> None:

@@ -77,36 +77,24 @@ class Ring:
     def __init__(self, length_s: float) -> None:
         self._length_s = length_s
         self._samples: NDArray[np.float64] = np.zeros(0)  # of the whole length, NaN where none came yet
-        self._next: int | None = None
-        self.rate_hz = 0.0
-        self.sensor = ''
-        self.channel = ''
-        self.unit = ''
-        self.lost = 0
+        self.last: TactileSignal | None = None  # batch
 
     def update(self, signal: TactileSignal) -> None:
         """Append a batch; a stream of another sensor or rate starts again, lost samples leave a gap of NaN."""
-        if (signal.sensor, signal.sampling_rate_hz) != (self.sensor, self.rate_hz):
-            self._begin(signal)
-        gap = 0 if self._next is None else max(0, signal.first_sample - self._next)
-        self._next = signal.next_sample
-        self.lost += gap
+        last, self.last = self.last, signal
         fresh = signal.samples[:, 0].astype(np.float64)
-        if gap:
+        if last is None or (signal.sensor, signal.sampling_rate_hz) != (last.sensor, last.sampling_rate_hz):
+            size = int(np.clip(round(self._length_s * signal.sampling_rate_hz), 1, MAX_SAMPLES))
+            self._samples = np.full(size, np.nan)
+        elif (gap := signal.first_sample - last.next_sample) > 0:
             fresh = np.concatenate([np.full(min(gap, len(self._samples)), np.nan), fresh])
         self._samples = np.concatenate([self._samples, fresh])[-len(self._samples) :]
 
     def newest(self, length_s: float) -> NDArray[np.float64]:
         """Return the newest samples, (n_samples,), oldest first; NaN where none came yet."""
-        count = min(len(self._samples), round(length_s * self.rate_hz))
+        rate_hz = self.last.sampling_rate_hz if self.last else 0.0
+        count = min(len(self._samples), round(length_s * rate_hz))
         return self._samples[len(self._samples) - count :]
-
-    def _begin(self, signal: TactileSignal) -> None:
-        size = int(np.clip(round(self._length_s * signal.sampling_rate_hz), 1, MAX_SAMPLES))
-        self._samples = np.full(size, np.nan)
-        self._next = None
-        self.rate_hz, self.sensor = signal.sampling_rate_hz, signal.sensor
-        self.channel, self.unit = signal.channels[0], signal.common_unit
 
 
 def envelope(samples: NDArray[np.float64], points: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -294,22 +282,20 @@ class Feed:
         }
 
     def _signal(self) -> dict[str, Any]:
-        ring = self._ring
-        low, high = envelope(ring.newest(SIGNAL_S), POINTS)
-        names = {'sensor': ring.sensor, 'channel': ring.channel, 'unit': ring.unit}
-        level = _number(float(np.std(ring.newest(LEVEL_S)))) if ring.rate_hz else None
+        last = self._ring.last
+        names = (last.sensor, last.channels[0], last.common_unit) if last else ('', '', '')
+        low, high = envelope(self._ring.newest(SIGNAL_S), POINTS)
         return {
-            **names,
-            'level': level,
+            **dict(zip(('sensor', 'channel', 'unit'), names, strict=True)),
+            'level': _number(float(np.std(self._ring.newest(LEVEL_S)))) if last else None,
             'low': _numbers(low),
             'high': _numbers(high),
             'length_s': SIGNAL_S,
-            'lost': ring.lost,
         }
 
     def _spectrum(self) -> dict[str, Any]:
         levels = spectrum_db(self._ring.newest(SPECTRUM_S), BINS)
-        return {'db': _numbers(levels), 'high_hz': self._ring.rate_hz / 2}
+        return {'db': _numbers(levels), 'high_hz': self._ring.last.sampling_rate_hz / 2 if self._ring.last else 0.0}
 
     def _image(self) -> dict[str, Any]:
         taxels = self._taxels

@@ -6,8 +6,6 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
-import dataclasses
-import math
 import os
 import re
 import selectors
@@ -17,7 +15,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -27,14 +25,23 @@ from xml.etree.ElementTree import Element
 
 import yaml
 
-from texture_core import config
-from texture_core.config import PARSE_ERRORS, FileRefused, find, parse_yaml, read_bounded, unknown_name
+from texture_core.config import (
+    PARSE_ERRORS,
+    FileRefused,
+    executable,
+    find,
+    find_file,
+    folder,
+    parse_yaml,
+    prefix,
+    read_bounded,
+    unknown_name,
+)
 from texture_core.errors import InvalidLaunch, LaunchFailed, TextureError
 
 # --------------------
 # A launcher as a child process of another program, which watches and ends it.
 
-DEATH = re.compile(r'\[launch\] .* (died with|was killed by) .*')
 STOP_DEADLINE_S = 15.0  # the launcher itself kills after 8 s
 
 
@@ -73,9 +80,10 @@ class ChildLauncher:
         self.stop()
 
     def check(self) -> None:
-        """Raise LaunchFailed, with the message of the log, if the nodes have ended."""
+        """Raise LaunchFailed, with the last line of the log, which names the cause, if the nodes have ended."""
         if self._process is not None and self._process.poll() is not None:
-            raise LaunchFailed(f'{self._reason()}; the output of all nodes is in {self.log}')
+            last = self.log.read_text(errors='replace').rstrip().rpartition('\n')[2].removeprefix('[launch] ')
+            raise LaunchFailed(f'{last or "the launcher ended"}; the output of all nodes is in {self.log}')
 
     def stop(self) -> None:
         """Stop the nodes and wait until none is left."""
@@ -87,12 +95,6 @@ class ChildLauncher:
         except subprocess.TimeoutExpired:
             self._process.kill()  # its nodes end with it
             self._process.wait()
-
-    def _reason(self) -> str:
-        """Return the sentence of the log that names what went wrong: a node that died, else the last line."""
-        lines = self.log.read_text(errors='replace').splitlines()
-        deaths = [line.removeprefix('[launch] ') for line in lines if DEATH.fullmatch(line)]
-        return f'node {deaths[0]}' if deaths else (lines or ['the launcher ended without a message'])[-1]
 
 
 # --------------------
@@ -144,28 +146,6 @@ def command(node: NodeDescription, parameter_folder: Path) -> list[str]:
     return [str(executable(node.package, node.executable)), '--ros-args', *options]
 
 
-# ROS packages and their executables over AMENT_PREFIX_PATH.
-INDEX = Path('share') / 'ament_index' / 'resource_index' / 'packages'
-
-
-def prefix(package: str) -> Path:
-    """Return the first prefix that holds a package; UnknownName, with the nearest package, if none does."""
-    prefixes = [Path(item) for item in os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep) if item]
-    for candidate in prefixes:
-        if (candidate / INDEX / package).exists():
-            return candidate
-    raise unknown_name(package, {item.name for place in prefixes for item in (place / INDEX).glob('*')}, 'package')
-
-
-def executable(package: str, name: str) -> Path:
-    """Return the path of an executable of a package; UnknownName, with the nearest one, if there is none."""
-    folder = prefix(package) / 'lib' / package
-    path = folder / name
-    if not (path.is_file() and os.access(path, os.X_OK)):
-        raise unknown_name(name, {item.name for item in folder.glob('*')}, f"executable of package '{package}'")
-    return path
-
-
 # --------------------
 # One node as a separate process group, which ends with the launcher.
 
@@ -182,7 +162,7 @@ def end_with(parent: int, number: signal.Signals) -> None:
         os._exit(1)
 
 
-class RunningNode:
+class RunningNode(subprocess.Popen[bytes]):
     """A running node, and the lines that it writes.
 
     Start it from the main thread of a program without other threads: the kernel ends it with the thread that did.
@@ -201,31 +181,22 @@ class RunningNode:
         self.last = ''  # line that it wrote
         self._say = say
         try:
-            self._process = subprocess.Popen(
+            super().__init__(
                 command_line,
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
                 # A pipe would hold the output of Python programs back until 8 KiB have come together.
                 env={**environment, 'PYTHONUNBUFFERED': '1'},
-                preexec_fn=partial(end_with, os.getpid(), signal.SIGTERM),  # noqa: PLW1509 - the launcher is a program without threads
+                preexec_fn=partial(end_with, os.getpid(), signal.SIGTERM),
                 start_new_session=True,
             )
         except OSError as error:
             raise LaunchFailed(f"'{command_line[0]}' cannot be started: {error.strerror}") from error
-        assert self._process.stdout is not None
-        self.stream: IO[bytes] = self._process.stdout
+        assert self.stdout is not None
+        self.stream: IO[bytes] = self.stdout
         self._begun = b''  # line
         os.set_blocking(self.stream.fileno(), False)
-
-    @property
-    def pid(self) -> int:
-        """Number of the process."""
-        return self._process.pid
-
-    def poll(self) -> int | None:
-        """Return the code with which the process ended; None while it runs."""
-        return self._process.poll()
 
     def read(self) -> bool:
         """Show the lines that have arrived; return whether anything had."""
@@ -241,7 +212,7 @@ class RunningNode:
     def close(self) -> None:
         """End what the process has started itself, show what is left, also of an unfinished line, and close."""
         self.send(signal.SIGKILL)
-        self._process.wait()
+        self.wait()
         while self.read():
             pass
         if self._begun:
@@ -253,24 +224,9 @@ class RunningNode:
         self._say(f'[{self.node.label}] {self.last}')
 
     def send(self, number: signal.Signals) -> None:
-        """Send a signal to the whole group of the process; one that is gone is left alone.
-
-        A Python program that is still importing would only print a traceback on SIGINT, so it gets SIGTERM instead: it
-        has handlers for both once it runs, and none for SIGTERM before.
-        """
-        if number == signal.SIGINT and not self._catches(signal.SIGTERM):
-            number = signal.SIGTERM
+        """Send a signal to the whole group of the process; one that is gone is left alone."""
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(self.pid, number)
-
-    def _catches(self, number: signal.Signals) -> bool:
-        """Return whether the process has a handler for a signal; True where that cannot be found out."""
-        try:
-            status = Path(f'/proc/{self.pid}/status').read_text(encoding='ascii', errors='replace')
-        except OSError:
-            return True
-        caught = next((line.split()[1] for line in status.splitlines() if line.startswith('SigCgt:')), 'f' * 16)
-        return bool(int(caught, 16) >> (number - 1) & 1)
 
 
 def ending(returncode: int) -> str:
@@ -305,11 +261,11 @@ class Supervisor:
         self._running: list[RunningNode] = []
         self._selector = selectors.DefaultSelector()
         self._stopping_since_s: float | None = None
-        self._failed = False
+        self._code = 0
         self._cause = ''  # why the launch ends without a request
 
     def run(self) -> int:
-        """Run the nodes to their end; return 0 if none died, else 1.
+        """Run the nodes to their end; return 0 if none died, 2 if a needed one reported an invalid input, else 1.
 
         SIGINT, SIGTERM and SIGHUP stop them; further ones change nothing, as an explorer needs its time to lift the
         finger. A node that had to be killed counts as one that died.
@@ -330,7 +286,7 @@ class Supervisor:
                     signal.signal(number, handler)
         if self._cause:  # repeated, as nodes that are being stopped write many lines
             self._say(f'[launch] the launch ended because {self._cause}')
-        return int(self._failed)
+        return self._code
 
     def stop(self) -> None:
         """Begin to stop all nodes, unless that has begun."""
@@ -357,7 +313,7 @@ class Supervisor:
         environment = dict(node.environment)
         if deaths and not any(environment.get(name) for name in PROFILES):
             # In the place of a dead node, with which the others still count, Fast DDS is to be discovered soon.
-            environment[PROFILES[0]] = str(config.folder('texture_bringup', 'config/fastdds') / 'restart.xml')
+            environment[PROFILES[0]] = str(folder('texture_bringup', 'config/fastdds') / 'restart.xml')
         process = RunningNode(node, self._commands[id(node)], environment, self._say)
         self._selector.register(process.stream, selectors.EVENT_READ, process)
         process.deaths = deaths
@@ -376,7 +332,7 @@ class Supervisor:
             process.signals = due
             process.send(number)
         if number is signal.SIGKILL:
-            self._failed = True
+            self._code = 1
             self._say('[launch] nodes that did not end were killed; check whether the finger still presses')
 
     def _end(self, process: RunningNode, code: int) -> None:
@@ -386,9 +342,9 @@ class Supervisor:
         restart = node.respawn and code != MISTAKE and not (stopping or self._together)
         restart = restart and (node.respawn_max_retries < 0 or process.deaths < node.respawn_max_retries)
         needed = node.needed or node.respawn or (self._together and code != 0)
-        self._failed |= code != 0 and not (stopping or restart)
-        ended = 'was ended while it started' if stopping and code == -signal.SIGTERM else ending(code)
-        self._say(f'[launch] {node.label} {ended}')
+        if code != 0 and not (stopping or restart):
+            self._code = MISTAKE if code == MISTAKE and needed else 1
+        self._say(f'[launch] {node.label} {ending(code)}')
         if restart:
             self._due.append((time.monotonic() + node.respawn_delay_s, node, process.deaths + 1))
         elif needed and not stopping:
@@ -433,87 +389,44 @@ def expand(text: str, perform: Perform) -> str:
 
 
 # --------------------
-# What a launch file can refer to at one place: variables, environment, namespace, packages.
+# The type of a parameter given as text: YAML's rules, as in ROS 2 launch files.
+
+TRUTH = {'true': True, '1': True, 'false': False, '0': False}
+SCALARS = (bool, int, float, str)
 
 
-@dataclass
-class Scope:
-    """Variables, environment and namespace; elements change them for what follows in the same scope."""
-
-    variables: dict[str, str]
-    environment: dict[str, str]
-    namespace: str = ''
-
-    def copy(self) -> Scope:
-        """Return a scope whose changes do not reach this one."""
-        return dataclasses.replace(self, variables=dict(self.variables), environment=dict(self.environment))
-
-    def expand(self, text: str) -> str:
-        """Return a text with its substitutions performed."""
-        return expand(text, self.perform)
-
-    def perform(self, name: str, arguments: Sequence[str]) -> str:
-        """Return the value of one substitution; UnknownName or InvalidLaunch if it has none."""
-        substitution, fewest, most = find(SUBSTITUTIONS, name, 'substitution')
-        if not fewest <= len(arguments) <= most:
-            raise InvalidLaunch(
-                f'$({" ".join([name, *arguments])}) has {len(arguments)} arguments; {fewest} to {most} are needed'
-            )
-        return substitution(self, *arguments)
+def _scalar(text: str) -> Any:
+    """Return what YAML reads in a text; the text itself if it is no YAML."""
+    try:
+        value = parse_yaml(text) if text else text
+    except PARSE_ERRORS:
+        return text
+    if not isinstance(value, SCALARS):
+        raise ValueError(text)
+    return value
 
 
-def _variable(scope: Scope, name: str, *default: str) -> str:
-    if name not in scope.variables and not default:
-        raise unknown_name(name, scope.variables, 'launch variable')
-    return scope.variables.get(name, *default)
-
-
-def _environment(scope: Scope, name: str, *default: str) -> str:
-    if name not in scope.environment and not default:
-        raise InvalidLaunch(
-            f"environment variable '{name}' is not set; set it, or give a default: $(env {name} DEFAULT)"
-        )
-    return scope.environment.get(name, *default)
-
-
-# How a call is performed, and the fewest and the most arguments that it takes.
-SUBSTITUTIONS: Mapping[str, tuple[Callable[..., str], int, int]] = {
-    'var': (_variable, 1, 2),
-    'env': (_environment, 1, 2),
-    'find-pkg-share': (lambda _, package: str(prefix(package) / 'share' / package), 1, 1),
-    'not-equals': (lambda _, left, right: 'true' if left != right else 'false', 2, 2),
+# What reads a text, and what is allowed.
+TYPES: Mapping[str, tuple[Callable[[str], Any], str]] = {
+    'yaml': (_scalar, 'true or false, a number or a text'),
+    'str': (str, 'a text'),
+    'float': (float, 'a number'),
+    'int': (int, 'a whole number'),
+    'bool': (lambda text: TRUTH[text.strip().lower()], 'true, false, 1 or 0'),
 }
 
 
-# --------------------
-# The type of a parameter given as text: YAML's rules, as in ROS 2 launch files.
-
-SCALARS = (bool, int, float, str)
-TYPES: Mapping[str, type | None] = {**{kind.__name__: kind for kind in SCALARS}, 'yaml': None}
-TRUTH = {'true': True, '1': True, 'false': False, '0': False}
-
-
-def parameter_value(text: str, type_name: str) -> Any:
-    """Return the value of a parameter: bool, int, float or str.
+def typed(text: str, type_name: str, where: str) -> Any:
+    """Return a text as a value of a type.
 
     Quotes do not keep `'$(var x)'` a string, as upstream reads the text as YAML before and after the substitution:
     `type="str"` does.
     """
-    kind = find(TYPES, type_name, 'parameter type')
-    if kind is str or not text:
-        return text
+    read, allowed = find(TYPES, type_name, 'parameter type')
     try:
-        if kind is bool and text in TRUTH:  # YAML takes 1 and 0 for numbers
-            return TRUTH[text]
-        value = kind(text) if kind in (int, float) else parse_yaml(text)
-        if not isinstance(value, kind or SCALARS):
-            raise ValueError(text)
-    except PARSE_ERRORS as error:
-        if kind is None and isinstance(error, yaml.YAMLError):
-            return text
-        wanted = kind.__name__ if kind else 'bool, int, float or str'
-        raise InvalidLaunch(f"parameter value '{text}' is no {wanted}; change it, or the param's type") from error
-    return value
+        return read(text)
+    except (ValueError, KeyError) as error:
+        raise InvalidLaunch(f"{where} is '{text}'; {allowed} is needed") from error
 
 
 # --------------------
@@ -524,8 +437,7 @@ def parameter_value(text: str, type_name: str) -> Any:
 
 MAX_BYTES = 200_000  # of one file; the longest in use has 5 kB
 MAX_INCLUDES = 20  # of files within each other
-SUFFIX = '.launch.xml'
-CONDITIONS = ('if', 'unless')
+CONDITIONS = {'if': True, 'unless': False}
 NODE_TEXTS = (
     'pkg',
     'exec',
@@ -536,33 +448,28 @@ NODE_TEXTS = (
     'respawn_max_retries',
     'on_exit',
 )
-# Attributes and child elements of each element; None: any element.
-ALLOWED: Mapping[str, tuple[Sequence[str], Sequence[str] | None]] = {
+# The attributes of each element, and the kinds of its child elements by their tag; None: any element.
+ALLOWED: Mapping[str, tuple[Collection[str], Mapping[str, str] | None]] = {
     'launch': ((), None),
-    'arg': (('name', 'default', 'description', *CONDITIONS), ('choice',)),
-    'arg of an include': (('name', 'value'), ()),
-    'let': (('name', 'value', *CONDITIONS), ()),
-    'set_env': (('name', 'value', *CONDITIONS), ()),
-    'push_ros_namespace': (('namespace', *CONDITIONS), ()),
+    'arg': (('name', 'default', 'description', *CONDITIONS), {'choice': 'choice'}),
+    'choice': (('value',), {}),
+    'arg of an include': (('name', 'value'), {}),
+    'let': (('name', 'value', *CONDITIONS), {}),
+    'set_env': (('name', 'value', *CONDITIONS), {}),
+    'push_ros_namespace': (('namespace', *CONDITIONS), {}),
     'group': (CONDITIONS, None),
-    'include': (('file', *CONDITIONS), ('arg',)),
-    'node': ((*NODE_TEXTS, 'output', *CONDITIONS), ('param', 'remap')),  # all output of a node is shown
-    'param': (('name', 'value', 'type', 'from'), ()),
-    'remap': (('from', 'to'), ()),
+    'include': (('file', *CONDITIONS), {'arg': 'arg of an include'}),
+    'node': ((*NODE_TEXTS, 'output', *CONDITIONS), {'param': 'param', 'remap': 'remap'}),  # all output is shown
+    'param': (('name', 'value', 'type', 'from'), {}),
+    'remap': (('from', 'to'), {}),
 }
+# The fewest and the most arguments that a substitution takes.
+SUBSTITUTIONS = {'var': (1, 1), 'env': (1, 2), 'find-pkg-share': (1, 1), 'not-equals': (2, 2)}
 
 
 def find_launch_file(name_or_path: str) -> Path:
-    """Return a launch file: a path, or the name of one of this package, such as 'emulator' or 'emulator.launch.xml'."""
-    path = Path(name_or_path).expanduser()
-    if path.is_file():
-        return path
-    folder = config.folder('texture_bringup', 'launch')
-    shipped = {item.name.removesuffix(SUFFIX): item for item in folder.glob(f'*{SUFFIX}')}
-    name = name_or_path.removesuffix(SUFFIX)
-    if name not in shipped:
-        raise unknown_name(name, shipped, 'launch file')
-    return shipped[name]
+    """Return a launch file: a path, or the name of one that a package ships, such as 'emulator'."""
+    return find_file(name_or_path, 'texture_bringup', 'launch', 'launch file', '.launch.xml')
 
 
 def given_arguments(texts: Iterable[str]) -> dict[str, str]:
@@ -590,8 +497,8 @@ def _refuse_special(given: Mapping[str, str]) -> None:
 def read(path: Path, given: Mapping[str, str], environment: Mapping[str, str]) -> list[NodeDescription]:
     """Return the nodes of a launch file, in its order."""
     _refuse_special(given)
-    reader = _Reader()
-    reader.read_file(path, Scope(dict(given), dict(environment)))
+    reader = _Reader(given, environment)
+    reader.read_file(path)
     for name in given:
         if name not in reader.declared:
             raise unknown_name(name, reader.declared, f'argument of {path.name}')
@@ -608,7 +515,7 @@ def all_arguments(path: Path, environment: Mapping[str, str]) -> dict[str, Eleme
             found.setdefault(name, element)
         for element in root.iter('include'):
             with contextlib.suppress(TextureError):
-                included = Path(Scope({}, dict(environment)).expand(_attribute(element, 'file')))
+                included = Path(_Reader({}, environment).text(element, 'file'))
                 waiting += [included] * (included not in seen)
                 seen.add(included)
     return found
@@ -645,9 +552,12 @@ def _check_form(element: Element, kind: str) -> None:
     for name in element.attrib:
         if name not in attributes:
             raise unknown_name(name, attributes, f'attribute of <{element.tag}>')
+    if children is None:
+        return
     for child in element:
-        if children is not None and child.tag not in children:
+        if child.tag not in children:
             raise unknown_name(child.tag, children, f'element inside <{element.tag}>')
+        _check_form(child, children[child.tag])
 
 
 def _attribute(element: Element, name: str) -> str:
@@ -656,43 +566,18 @@ def _attribute(element: Element, name: str) -> str:
     return element.attrib[name]
 
 
-def _truth(text: str, where: str) -> bool:
-    value = TRUTH.get(text.strip().lower())
-    if value is None:
-        raise InvalidLaunch(f"{where} is '{text}'; true, false, 1 or 0 is needed")
-    return value
-
-
-def _number(text: str, name: str, lowest: float) -> float:
-    """Return a number of a node that is finite and not below the lowest that is allowed."""
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not lowest <= number < math.inf:
-        raise InvalidLaunch(f"'{name}' of <node> is '{text}'; a number from {lowest:g} is needed")
-    return number
-
-
-def _wanted(element: Element, scope: Scope) -> bool:
-    """Return whether its condition is met; true without one."""
-    given = [name for name in CONDITIONS if name in element.attrib]
-    if len(given) > 1:
-        raise InvalidLaunch(f"<{element.tag}> has both 'if' and 'unless'; give one of them")
-    if not given:
-        return True
-    met = _truth(scope.expand(element.attrib[given[0]]), f"'{given[0]}' of <{element.tag}>")
-    return met == (given[0] == 'if')
-
-
 class _Reader:
-    """Read launch files: collects the nodes, and the names of all declared arguments."""
+    """Read launch files: collects the nodes, and the names of all declared arguments.
 
-    def __init__(self) -> None:
+    Variables, environment and namespace are those at the present place; elements change them for what follows.
+    """
+
+    def __init__(self, variables: Mapping[str, str], environment: Mapping[str, str]) -> None:
         self.nodes: list[NodeDescription] = []
         self.declared: set[str] = set()
+        self._variables, self._environment, self._namespace = dict(variables), dict(environment), ''
         self._depth = 0
-        self._readers: Mapping[str, Callable[[Element, Scope], None]] = {
+        self._readers: Mapping[str, Callable[[Element], None]] = {
             'arg': self._read_arg,
             'let': self._read_let,
             'set_env': self._read_set_env,
@@ -702,7 +587,7 @@ class _Reader:
             'node': self._read_node,
         }
 
-    def read_file(self, path: Path, scope: Scope) -> None:
+    def read_file(self, path: Path) -> None:
         """Read a file; its nodes join those of other files."""
         root = _root(path)
         if self._depth > MAX_INCLUDES:
@@ -712,99 +597,115 @@ class _Reader:
         self.declared |= set(_declared(root))
         try:
             _check_form(root, 'launch')
-            self._children(root, scope)
+            self._read_children(root)
         except TextureError as error:
             raise type(error)(f'{path.name}: {error}') from error
         self._depth -= 1
 
-    def _children(self, parent: Element, scope: Scope) -> None:
+    def text(self, element: Element, name: str) -> str:
+        """Return an attribute with its substitutions performed."""
+        return expand(_attribute(element, name), self._perform)
+
+    def _perform(self, name: str, arguments: Sequence[str]) -> str:
+        """Return the value of one substitution; UnknownName or InvalidLaunch if it has none."""
+        fewest, most = find(SUBSTITUTIONS, name, 'substitution')
+        if not fewest <= len(arguments) <= most:
+            raise InvalidLaunch(
+                f'$({" ".join([name, *arguments])}) has {len(arguments)} arguments; {fewest} to {most} are needed'
+            )
+        first, *rest = arguments
+        if name == 'find-pkg-share':
+            return str(prefix(first) / 'share' / first)
+        if name == 'not-equals':
+            return 'true' if first != rest[0] else 'false'
+        known = self._variables if name == 'var' else self._environment
+        if first in known:
+            return known[first]
+        if rest:
+            return rest[0]
+        if name == 'var':
+            raise unknown_name(first, known, 'launch variable')
+        raise InvalidLaunch(
+            f"environment variable '{first}' is not set; set it, or give a default: $(env {first} DEFAULT)"
+        )
+
+    def _read_children(self, parent: Element) -> None:
         for element in parent:
             if element.tag not in self._readers:
                 raise unknown_name(element.tag, self._readers, 'launch element')
             _check_form(element, element.tag)
-            if _wanted(element, scope):
-                self._readers[element.tag](element, scope)
+            conditions = [name for name in CONDITIONS if name in element.attrib]
+            where = f'of <{element.tag}>'
+            if all(typed(self.text(element, c), 'bool', f"'{c}' {where}") is CONDITIONS[c] for c in conditions):
+                self._readers[element.tag](element)
 
-    def _read_arg(self, element: Element, scope: Scope) -> None:
+    def _read_arg(self, element: Element) -> None:
         name = _attribute(element, 'name')
-        if name not in scope.variables:
+        if name not in self._variables:
             if 'default' not in element.attrib:
                 raise InvalidLaunch(f"argument '{name}' is required; give {name}:=VALUE")
-            scope.variables[name] = scope.expand(element.attrib['default'])
-        choices = [_attribute(choice, 'value') for choice in element]
-        if choices and scope.variables[name] not in choices:
-            raise InvalidLaunch(
-                f"argument '{name}' is '{scope.variables[name]}'; allowed is one of {', '.join(choices)}"
-            )
+            self._variables[name] = self.text(element, 'default')
+        value, choices = self._variables[name], [_attribute(choice, 'value') for choice in element]
+        if choices and value not in choices:
+            raise InvalidLaunch(f"argument '{name}' is '{value}'; allowed is one of {', '.join(choices)}")
 
-    def _read_let(self, element: Element, scope: Scope) -> None:
-        scope.variables[scope.expand(_attribute(element, 'name'))] = scope.expand(_attribute(element, 'value'))
+    def _read_let(self, element: Element) -> None:
+        self._variables[self.text(element, 'name')] = self.text(element, 'value')
 
-    def _read_set_env(self, element: Element, scope: Scope) -> None:
-        scope.environment[scope.expand(_attribute(element, 'name'))] = scope.expand(_attribute(element, 'value'))
+    def _read_set_env(self, element: Element) -> None:
+        self._environment[self.text(element, 'name')] = self.text(element, 'value')
 
-    def _read_namespace(self, element: Element, scope: Scope) -> None:
-        scope.namespace = joined_namespace(scope.namespace, scope.expand(_attribute(element, 'namespace'))) or '/'
+    def _read_namespace(self, element: Element) -> None:
+        self._namespace = joined_namespace(self._namespace, self.text(element, 'namespace')) or '/'
 
-    def _read_group(self, element: Element, scope: Scope) -> None:
-        self._children(element, scope.copy())
+    def _read_group(self, element: Element) -> None:
+        before = dict(self._variables), dict(self._environment), self._namespace
+        self._read_children(element)
+        self._variables, self._environment, self._namespace = before
 
-    def _read_include(self, element: Element, scope: Scope) -> None:
-        path = Path(scope.expand(_attribute(element, 'file')))
+    def _read_include(self, element: Element) -> None:
+        path = Path(self.text(element, 'file'))
         known = _declared(_root(path))
-        given = {}
-        for item in element:
-            _check_form(item, 'arg of an include')
-            name = scope.expand(_attribute(item, 'name'))
+        given = {self.text(item, 'name'): self.text(item, 'value') for item in element}
+        for name in given:
             if name not in known:
                 raise unknown_name(name, known, f'argument of {path.name}')
-            given[name] = scope.expand(_attribute(item, 'value'))
-        scope.variables.update(given)
-        self.read_file(path, scope)
+        self._variables.update(given)
+        self.read_file(path)
 
-    def _read_node(self, element: Element, scope: Scope) -> None:
-        texts = {name: scope.expand(element.get(name, '')) for name in NODE_TEXTS}
-        _attribute(element, 'pkg')
-        _attribute(element, 'exec')
-        if texts['on_exit'] not in ('', 'shutdown'):
-            raise InvalidLaunch(f"'on_exit' of <node> is '{texts['on_exit']}'; allowed is shutdown")
+    def _read_node(self, element: Element) -> None:
+        texts = {name: self.text(element, name) for name in NODE_TEXTS if name in element.attrib}
+        if (on_exit := texts.get('on_exit', 'shutdown')) != 'shutdown':
+            raise InvalidLaunch(f"'on_exit' of <node> is '{on_exit}'; allowed is shutdown")
+        namespace = joined_namespace(self._namespace, texts.get('namespace', ''))
         self.nodes.append(
             NodeDescription(
-                package=texts['pkg'],
-                executable=texts['exec'],
-                name=texts['name'],
-                namespace=joined_namespace(scope.namespace, texts['namespace'])
-                or '/' * ('namespace' in element.attrib),
-                parameters=tuple(_parameter(item, scope) for item in element.findall('param')),
-                remappings=tuple(_remapping(item, scope) for item in element.findall('remap')),
-                respawn=_truth(texts['respawn'] or 'false', "'respawn' of <node>"),
-                respawn_delay_s=_number(texts['respawn_delay'] or '0', 'respawn_delay', 0.0),
-                respawn_max_retries=int(_number(texts['respawn_max_retries'] or '-1', 'respawn_max_retries', -1.0)),
-                needed=texts['on_exit'] == 'shutdown',
-                environment=dict(scope.environment),
+                package=self.text(element, 'pkg'),
+                executable=self.text(element, 'exec'),
+                name=texts.get('name', ''),
+                namespace=namespace or '/' * ('namespace' in texts),
+                parameters=tuple(self._parameter(item) for item in element.findall('param')),
+                remappings=tuple((self.text(item, 'from'), self.text(item, 'to')) for item in element.findall('remap')),
+                respawn=typed(texts.get('respawn', 'false'), 'bool', "'respawn' of <node>"),
+                respawn_delay_s=typed(texts.get('respawn_delay', '0'), 'float', "'respawn_delay' of <node>"),
+                respawn_max_retries=typed(
+                    texts.get('respawn_max_retries', '-1'), 'int', "'respawn_max_retries' of <node>"
+                ),
+                needed='on_exit' in texts,
+                environment=dict(self._environment),
             )
         )
 
-
-def _remapping(element: Element, scope: Scope) -> tuple[str, str]:
-    _check_form(element, 'remap')
-    return scope.expand(_attribute(element, 'from')), scope.expand(_attribute(element, 'to'))
-
-
-def _parameter(element: Element, scope: Scope) -> Path | dict[str, Any]:
-    """Return a parameter file, or a name with its value."""
-    _check_form(element, 'param')
-    if 'from' not in element.attrib:
-        name, text = scope.expand(_attribute(element, 'name')), scope.expand(_attribute(element, 'value'))
-        try:
-            return {name: parameter_value(text, element.get('type', 'yaml'))}
-        except InvalidLaunch as error:
-            raise InvalidLaunch(f"<param name='{name}'>: {error}") from error
-    path = Path(scope.expand(element.attrib['from']))
-    if 'name' in element.attrib:
-        raise InvalidLaunch(f"<param from='{path}'> also has a name; the file holds the names")
-    if not path.is_file():
-        if path.parts[-4:-1] == ('texture_bringup', 'config', 'robots'):
-            raise unknown_name(path.stem, [item.stem for item in path.parent.glob('*.yaml')], 'preset')
-        raise InvalidLaunch(f"there is no parameter file '{path}'; give the path of one")
-    return path
+    def _parameter(self, element: Element) -> Path | dict[str, Any]:
+        """Return a parameter file, or a name with its value."""
+        if 'from' not in element.attrib:
+            name, kind = self.text(element, 'name'), element.get('type', 'yaml')
+            return {name: typed(self.text(element, 'value'), kind, f"the value of <param name='{name}'>")}
+        path = Path(self.text(element, 'from'))
+        if 'name' in element.attrib:
+            raise InvalidLaunch(f"<param from='{path}'> also has a name; the file holds the names")
+        if not path.is_file():
+            if path.parts[-4:-1] == ('texture_bringup', 'config', 'robots'):
+                raise unknown_name(path.stem, [item.stem for item in path.parent.glob('*.yaml')], 'preset')
+            raise InvalidLaunch(f"there is no parameter file '{path}'; give the path of one")
+        return path

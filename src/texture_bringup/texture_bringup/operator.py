@@ -4,12 +4,10 @@
 
 from __future__ import annotations
 
-import asyncio
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from types import TracebackType
 from typing import Any
 from uuid import uuid4
@@ -24,7 +22,7 @@ from rclpy.action.client import ClientGoalHandle
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.parameter import Parameter
+from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.task import Future
 from rclpy.utilities import get_rmw_implementation_identifier
@@ -58,33 +56,6 @@ from texture_core.types import ExplorationRequest, ExplorationState, FeatureVect
 def middleware() -> str:
     """Return the name of the implementation of ROS that is used."""
     return str(get_rmw_implementation_identifier())
-
-
-# --------------------
-# Wait in a coroutine for an answer of ROS, which comes in another thread.
-
-FOUND_DEADLINE_S, FOUND_STEP_S = 5.0, 0.05
-
-
-async def ready(is_ready: Callable[[], bool], node: str) -> None:
-    """Wait until a node can be called: one that has just started is discovered a moment later."""
-    deadline_s = time.monotonic() + FOUND_DEADLINE_S
-    while not is_ready():
-        if time.monotonic() > deadline_s:
-            raise LaunchFailed(f'no {node} answers; is it running?')
-        await asyncio.sleep(FOUND_STEP_S)
-
-
-async def answer_of(future: Future, deadline_s: float) -> Any:
-    """Return the result of a future of ROS, which the executor's thread completes."""
-    loop = asyncio.get_running_loop()
-    answered: asyncio.Event = asyncio.Event()
-    future.add_done_callback(lambda _future: loop.call_soon_threadsafe(answered.set))
-    try:
-        await asyncio.wait_for(answered.wait(), deadline_s)
-    except asyncio.TimeoutError as error:
-        raise LaunchFailed(f'no answer within {deadline_s:.0f} s') from error
-    return future.result()
 
 
 # --------------------
@@ -127,17 +98,16 @@ def subscribe(node: Node, feed: Feed, on_bad: Callable[[InvalidData], None]) -> 
 
         return on_message
 
+    def note_diagnostics(message: DiagnosticArray) -> None:
+        ours = node.get_namespace().rstrip('/') + '/'
+        for status in message.status:
+            if status.name.startswith(ours):
+                level, name = LEVEL_NAMES.get(status.level, 'ERROR'), status.name.removeprefix(ours)
+                feed.node_statuses.update(name, level, status.message, time.monotonic(), has_ended(status))
+
     for topic, (kind, take) in feed.topics.items():
         node.create_subscription(getattr(msg, kind), topic, taking(take), quality_of_service(topic))
-
-
-def note_diagnostics(node: Node, feed: Feed, message: DiagnosticArray) -> None:
-    """Give the statuses of the nodes in the namespace of `node` to a feed."""
-    ours = node.get_namespace().rstrip('/') + '/'
-    for status in message.status:
-        if status.name.startswith(ours):
-            level, name = LEVEL_NAMES.get(status.level, 'ERROR'), status.name.removeprefix(ours)
-            feed.node_statuses.update(name, level, status.message, time.monotonic(), has_ended(status))
+    node.create_subscription(DiagnosticArray, '/diagnostics', note_diagnostics, 100)
 
 
 # --------------------
@@ -156,6 +126,7 @@ LISTEN_S = 0.5  # without feedback, until its state is subscribed to
 ACCEPT_S = 15.0
 # Time to find a service, and time for its answer: an arm needs seconds to recover, a tare up to 65 s.
 OFFERED_S, ANSWER_S = 10.0, 75.0
+SETTINGS_S = 30.0  # to find the parameters of a node
 RETRY_PERIOD_S = 5.0
 # What this process has discovered, the others discover soon after.
 DISCOVERY_S = 1.0
@@ -364,27 +335,24 @@ class Operator:
                 raise LaunchFailed(f"node '{node}' is {label} and refuses to change; its output gives the reason")
         return label
 
-    def add(self, label: str, exploration_id: str = '', deadline_s: float = 30.0) -> tuple[int, str]:
+    def add(self, label: str, exploration_id: str = '') -> tuple[int, str]:
         """Add an exploration, the last one if '', to a texture; return its number of windows and a sentence."""
         request = srv.AddTexture.Request(label=label, exploration_id=exploration_id)
-        answer = self._ask_classifier(srv.AddTexture, 'classifier/add_texture', request, deadline_s)
+        answer = self._ask_classifier(srv.AddTexture, 'classifier/add_texture', request)
         return int(answer.examples), str(answer.message)
 
-    def remove(self, label: str, deadline_s: float = 30.0) -> str:
+    def remove(self, label: str) -> str:
         """Remove all slides that were added as a texture; return what happened in a sentence."""
         request = srv.RemoveTexture.Request(label=label)
-        return str(self._ask_classifier(srv.RemoveTexture, 'classifier/remove_texture', request, deadline_s).message)
+        return str(self._ask_classifier(srv.RemoveTexture, 'classifier/remove_texture', request).message)
 
-    def remove_last_added(self, deadline_s: float = 30.0) -> str:
+    def remove_last_added(self) -> str:
         """Let the classifier remove the slide that was added last; return what happened. Raises as `add` does."""
-        return str(self._ask_classifier(Trigger, 'classifier/remove_last_added', Trigger.Request(), deadline_s).message)
+        return str(self._ask_classifier(Trigger, 'classifier/remove_last_added', Trigger.Request()).message)
 
     def watch(self, feed: Feed, show: Callable[[], None]) -> None:
         """Let a feed take what the nodes publish, and call `show` after each message, until Ctrl-C."""
         subscribe(self._node, feed, lambda _error: None)
-        self._node.create_subscription(
-            DiagnosticArray, '/diagnostics', partial(note_diagnostics, self._node, feed), 100
-        )
         while True:
             self._step()
             show()
@@ -408,10 +376,10 @@ class Operator:
         settled_s = time.monotonic() + DISCOVERY_S
         self._until(lambda: time.monotonic() > settled_s, 2 * DISCOVERY_S, '')
 
-    def _ask_classifier(self, kind: Any, name: str, request: Any, deadline_s: float) -> Any:
+    def _ask_classifier(self, kind: Any, name: str, request: Any) -> Any:
         """Return the answer of a service of the classifier that succeeded."""
         missing, silent = 'no classifier answers; is it running?', 'the classifier does not answer; look at its output'
-        answer = self._ask(kind, name, request, (deadline_s, missing), (deadline_s, silent))
+        answer = self._ask(kind, name, request, (OFFERED_S, missing), (ANSWER_S, silent))
         if not answer.success if kind is Trigger else answer.error_code:
             raise InvalidData(answer.message)
         return answer
@@ -427,35 +395,33 @@ class Operator:
             self._node.destroy_client(client)
         return future.result()
 
-    def set_parameters(self, node: str, values: Mapping[str, Any], deadline_s: float = 30.0) -> None:
+    def set_parameters(self, node: str, values: Mapping[str, Any]) -> None:
         """Set parameters of a node."""
-        client = self._parameters_of(node, deadline_s)
+        client = self._parameters_of(node)
         self._set(node, client, [Parameter(name, value=value) for name, value in values.items()])
 
-    def parameters(self, node: str, names: Sequence[str], deadline_s: float = 10.0) -> list[float]:
-        """Return numbers that a node holds as parameters, in the order of their names."""
-        client = self._parameters_of(node, deadline_s)
-        return [one.double_value for one in self._answer(node, client.get_parameters(list(names))).values]
+    def parameters(self, node: str, names: Sequence[str]) -> list[Any]:
+        """Return the values of parameters of a node, in the order of their names."""
+        client = self._parameters_of(node)
+        answer = self._answer(node, client.get_parameters(list(names)))
+        return [parameter_value_to_python(one) for one in answer.values]
 
-    def set_from_texts(self, node: str, texts: Mapping[str, str], deadline_s: float = 10.0) -> None:
+    def set_from_texts(self, node: str, texts: Mapping[str, str]) -> None:
         """Set parameters of a node from texts, read as the types that it has declared; UnknownName with the nearest."""
-        client = self._parameters_of(node, deadline_s)
+        client = self._parameters_of(node)
         known = self._answer(node, client.list_parameters([], 10)).result.names
         for name in texts:
             if name not in known:
                 raise unknown_name(name, known, f'parameter of {node}')
         values = self._answer(node, client.get_parameters(list(texts))).values
-        self._set(
-            node,
-            client,
-            [parameter_from_text(*pair, one.type) for pair, one in zip(texts.items(), values, strict=True)],
-        )
+        read = [parameter_from_text(*pair, one.type) for pair, one in zip(texts.items(), values, strict=True)]
+        self._set(node, client, read)
 
-    def _parameters_of(self, node: str, deadline_s: float) -> AsyncParameterClient:
+    def _parameters_of(self, node: str) -> AsyncParameterClient:
         if node not in self._settings:
             self._settings[node] = AsyncParameterClient(self._node, node)
         client = self._settings[node]
-        self._until(client.services_are_ready, deadline_s, f"node '{node}' does not answer; is it running?")
+        self._until(client.services_are_ready, SETTINGS_S, f"node '{node}' does not answer; is it running?")
         return client
 
     def _answer(self, node: str, future: Future) -> Any:

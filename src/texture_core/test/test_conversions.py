@@ -12,7 +12,7 @@ import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 from texture_msgs import msg
 
-from texture_core.errors import CollectionError, ExplorationError, InvalidData
+from texture_core.errors import ExplorationError, InvalidData
 from texture_core.ros import frame_name, from_msg, to_msg
 from texture_core.types import (
     ExplorationRequest,
@@ -123,7 +123,6 @@ def test_each_phase_has_the_constant_of_the_message(phase: Phase) -> None:
     ('codes', 'message', 'prefix'),
     [
         (ExplorationError, msg.ExplorationResult, 'ERROR_'),
-        (CollectionError, msg.CollectionResult, 'ERROR_'),
         (Rejection, msg.TextureEstimate, 'REJECTION_'),
     ],
 )

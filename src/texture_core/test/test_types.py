@@ -153,16 +153,6 @@ def test_a_kind_is_as_long_as_its_middle_slide() -> None:
     assert group_similar(slides) == [ASKED] * 3
 
 
-def test_a_state_survives_the_wire() -> None:
-    state = FingerState(123_456_789_012, 0.1, -0.2, 0.003, 0.05, 0.0, -0.01, 1.5)
-    assert FingerState.from_bytes(state.to_bytes()) == state
-
-
-@pytest.mark.parametrize('data', [b'', b'TTF1', b'X' * 68, FingerState(1).to_bytes() + b'\0'])
-def test_foreign_bytes_are_no_state(data: bytes) -> None:
-    assert FingerState.from_bytes(data) is None
-
-
 def test_the_emulator_is_told_the_state_of_the_finger_if_there_is_one(tmp_path: Path) -> None:
     path = tmp_path / 'left' / 'finger'
     sender, silent = FingerSender(str(path)), FingerSender('')
@@ -171,23 +161,15 @@ def test_the_emulator_is_told_the_state_of_the_finger_if_there_is_one(tmp_path: 
         emulator = FingerReceiver(str(path))
         assert emulator.states() == []
         silent.send(FingerState(0))
-        for time_ns in (7, 8):
-            sender.send(FingerState(time_ns))
-        assert emulator.states(10.0) == [FingerState(7), FingerState(8)]
+        states = [FingerState(7, 0.1, -0.2, 0.003, 0.05, 0.0, -0.01, 1.5), FingerState(8)]
+        for state in states:
+            sender.send(state)
+        path.write_bytes(b'X' * 70)  # of another program
+        assert emulator.states(10.0) == states
         emulator.close()
         assert not path.exists()
         sender.send(FingerState(9))
     sender.close()
-
-
-def test_a_state_after_foreign_bytes_is_understood(tmp_path: Path) -> None:
-    emulator = FingerReceiver(str(tmp_path / 'finger'))
-    (tmp_path / 'finger').write_bytes(b'X' * 100 + FingerState(7).to_bytes() + b'X')
-    assert emulator.states() == [FingerState(7)]
-    (tmp_path / 'finger').write_bytes(FingerState(8).to_bytes())
-    assert emulator.states() == [FingerState(8)]
-    assert (emulator.received, emulator.refused) == (2, 2)
-    emulator.close()
 
 
 def test_a_sender_never_waits_for_an_emulator_that_does_not_read(tmp_path: Path) -> None:

@@ -123,10 +123,14 @@ def library(name: str, purpose: str, extra: str) -> Any:
 SOURCE_TREE = Path(__file__).resolve().parents[2]
 
 
+def _prefixes() -> list[Path]:
+    """Return the places of installed packages."""
+    return [Path(item) for item in os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep) if item]
+
+
 def folder(package: str, name: str) -> Path:
     """Return the folder `name` ('config/recipes') of a package; the first of the places that has it."""
-    prefixes = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
-    places = [SOURCE_TREE / package, *(Path(prefix) / 'share' / package for prefix in prefixes if prefix)]
+    places = [SOURCE_TREE / package, *(place / 'share' / package for place in _prefixes())]
     for place in places:
         if (place / name).is_dir():
             return place / name
@@ -139,18 +143,14 @@ def shipped(package: str, subfolder: str, suffix: str = '.yaml') -> dict[str, Pa
     Any installed package may add recipes, scenes or presets by having such a folder in its share; where two have a file
     of the same name, that of `package` counts.
     """
-    prefixes = [
-        Path(prefix) / 'share' for prefix in os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep) if prefix
-    ]
-    others = [manifest.parent.name for place in (SOURCE_TREE, *prefixes) for manifest in place.glob('*/package.xml')]
-    names = dict.fromkeys([*sorted(others, reverse=True), package])  # the last one counts
-    names[package] = names.pop(package)
-    return {
-        item.stem: item
-        for name in names
-        for item in sorted(folder(name, subfolder).glob(f'*{suffix}'))
-        if item.is_file()
-    }
+    places = [SOURCE_TREE, *(place / 'share' for place in _prefixes())]
+    others = {manifest.parent.name for place in places for manifest in place.glob('*/package.xml')} - {package}
+    found = {}
+    for name in (*sorted(others, reverse=True), package):  # the last one counts
+        for item in sorted(folder(name, subfolder).glob(f'*{suffix}')):
+            if item.is_file():  # no link of an older installation
+                found[item.name.removesuffix(suffix)] = item
+    return found
 
 
 def find_file(name_or_path: str, package: str, subfolder: str, kind: str, suffix: str = '.yaml') -> Path:
@@ -164,6 +164,26 @@ def find_file(name_or_path: str, package: str, subfolder: str, kind: str, suffix
     if name_or_path not in known:
         raise unknown_name(name_or_path, known, kind)
     return known[name_or_path]
+
+
+# Packages that are installed, and their executables.
+INDEX = Path('share') / 'ament_index' / 'resource_index' / 'packages'
+
+
+def prefix(package: str) -> Path:
+    """Return the first prefix that holds a package; UnknownName, with the nearest package, if none does."""
+    for place in _prefixes():
+        if (place / INDEX / package).exists():
+            return place
+    raise unknown_name(package, {item.name for place in _prefixes() for item in (place / INDEX).glob('*')}, 'package')
+
+
+def executable(package: str, name: str) -> Path:
+    """Return the path of an executable of a package; UnknownName, with the nearest one, if there is none."""
+    place = prefix(package) / 'lib' / package
+    if not (place / name).is_file():
+        raise unknown_name(name, {item.name for item in place.glob('*')}, f"executable of package '{package}'")
+    return place / name
 
 
 # --------------------
@@ -501,15 +521,6 @@ def parameters_of(cls: type) -> list[Parameter]:
         meta = {'description': '', 'unit': '', 'low': None, 'high': None, 'choices': (), **item.metadata}
         listed.append(Parameter(item.name, types[item.name], default, **meta))
     return listed
-
-
-def check_option(cls: type, name: str, value: Any) -> None:
-    """Check the option `--NAME` of a command, which sets a parameter."""
-    parameter = next(one for one in parameters_of(cls) if one.name == name)
-    try:
-        parameter.check(value)
-    except InvalidParameter as error:
-        raise InvalidParameter(str(error).replace(f"parameter '{name}'", f'--{name}', 1)) from None
 
 
 def from_mapping(cls: type[T], values: Mapping[str, Any], where: str = '') -> T:

@@ -75,13 +75,9 @@ class ExplorationError(enum.IntEnum):
 
 
 class CollectionError(enum.IntEnum):
-    """Why a collection is no success: `error_code` of the message CollectionResult, which describes each value."""
+    """Why a collection is no success."""
 
     NONE = 0
-    INTERNAL = 1
-    INVALID_REQUEST = 11
-    BUSY = 12
-    NOT_ACTIVE = 13
     STOPPED = 20
     CANCELLED = 21
     MOTION_FAILED = 24

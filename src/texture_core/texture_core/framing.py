@@ -44,13 +44,11 @@ class Frame(NamedTuple):
 class FrameDecoder:
     """Decode frames from a byte stream with lost, added or damaged bytes."""
 
-    def __init__(self, max_frame_bytes: int = MAX_FRAME_BYTES) -> None:
+    def __init__(self) -> None:
         self.frames = 0
         self.bad_frames = 0  # too short or long, wrongly stuffed, or of a wrong checksum
         self.lost = 0  # frames whose number never came
         self.repeated = 0  # came twice; the second is left out
-        self.renumbered = 0  # numbers went back: the device restarted
-        self._max_bytes = max_frame_bytes
         self.restart()
 
     def restart(self) -> None:
@@ -63,7 +61,7 @@ class FrameDecoder:
         """Return the frames completed by `data`; never raises."""
         *segments, unfinished = (self._unfinished + data).split(DELIMITER)
         # One byte more than allowed is enough to refuse the frame when its end comes.
-        self._unfinished = unfinished[: self._max_bytes + 1]
+        self._unfinished = unfinished[: MAX_FRAME_BYTES + 1]
         frames = [frame for segment in segments if (frame := self._decode(segment)) is not None]
         self.frames += len(frames)
         return frames
@@ -71,7 +69,7 @@ class FrameDecoder:
     def _decode(self, segment: bytes) -> Frame | None:
         """Return the frame in the bytes between two zeros, unless it is damaged or a repetition."""
         synchronised, self._synchronised = self._synchronised, True
-        frame = unpack(segment) if len(segment) <= self._max_bytes else None
+        frame = unpack(segment) if len(segment) <= MAX_FRAME_BYTES else None
         if frame is not None:
             return self._check_sequence(frame)
         # Reading may begin in the middle of a frame, and a sender may add zeros at any time: both are no fault.
@@ -85,8 +83,7 @@ class FrameDecoder:
         if step == 0:
             self.repeated += 1
             return None
-        if step >= range_ // 2:  # a line never changes the order
-            self.renumbered += 1
+        if step >= range_ // 2:  # numbers went back: the device restarted, as a line never changes the order
             return frame
         self.lost += step - 1
         return frame._replace(lost=step - 1) if step > 1 else frame

@@ -60,6 +60,7 @@ from texture_core.types import (
 
 LEVELS = {'OK': DiagnosticStatus.OK, 'WARN': DiagnosticStatus.WARN, 'ERROR': DiagnosticStatus.ERROR}
 ENDED = 'ended'  # the value that the last report of a node carries
+PERIOD_S = 1.0
 ACKNOWLEDGED_S = 1.0  # the longest that a node waits at its end for the readers of that report
 DiagnosticReport = tuple[str, str, Mapping[str, Any]]
 
@@ -67,14 +68,12 @@ DiagnosticReport = tuple[str, str, Mapping[str, Any]]
 class Diagnostics:
     """Publish a status once a second, and on request."""
 
-    def __init__(
-        self, node: Any, report: Callable[[], DiagnosticReport], hardware_id: str = '', period_s: float = 1.0
-    ) -> None:
+    def __init__(self, node: Any, report: Callable[[], DiagnosticReport], hardware_id: str = '') -> None:
         self._node = node
         self._report = report
         self.hardware_id = hardware_id
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        self._timer = node.create_timer(period_s, self.publish)
+        self._timer = node.create_timer(PERIOD_S, self.publish)
 
     def publish(self) -> None:
         """Publish the status now."""

@@ -20,23 +20,13 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 
-from texture_core.errors import DeviceError
+from texture_core.config import executable
 
 # --------------------
 # Nodes of the suite as processes: start, measure the computing time, stop.
 
 ENDS_WITHIN_S = 20.0
 TICKS_PER_S = os.sysconf('SC_CLK_TCK')
-
-
-def executable(package: str, node: str) -> Path:
-    """Return the executable of a node in the first installation that has it."""
-    prefixes = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
-    for prefix in filter(None, prefixes):
-        path = Path(prefix) / 'lib' / package / node
-        if path.is_file():
-            return path
-    raise DeviceError(f"no executable '{node}' of '{package}' is installed; build and source the workspace")
 
 
 @contextmanager

@@ -608,7 +608,7 @@ DEVICES = f'{os.environ.get("XDG_RUNTIME_DIR", "/tmp")}/tactile_texture'
 
 FORMAT = struct.Struct('<4sq7d')
 MAGIC = b'TTF1'
-PIPE_BYTES = 65536  # that a pipe of Linux holds: states of 2 s at 500 Hz
+READ_BYTES = 960 * FORMAT.size  # nearly what a pipe of Linux holds: states of 2 s at 500 Hz
 
 
 def loopback_address(ip: str) -> str:
@@ -643,14 +643,6 @@ class FingerState:
         """Return the state as sent: magic, time, seven doubles, little endian."""
         return FORMAT.pack(MAGIC, *astuple(self))
 
-    @classmethod
-    def from_bytes(cls, data: bytes) -> FingerState | None:
-        """Return the state in bytes, or None if they are not one."""
-        if len(data) != FORMAT.size or not data.startswith(MAGIC):
-            return None
-        _, time_ns, *numbers = FORMAT.unpack(data)
-        return cls(time_ns, *numbers)
-
 
 class FingerSender:
     """Sends finger states into the named pipe of an emulator, if it exists; the path '' sends none."""
@@ -683,10 +675,7 @@ class FingerReceiver:
     """The emulator's end of the named pipe at a path, which it creates and removes."""
 
     def __init__(self, path: str) -> None:
-        self.received = 0
-        self.refused = 0  # invalid pieces between states
         self._path = Path(path).expanduser()
-        self._rest = b''
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
             if not self._path.is_fifo():
@@ -709,23 +698,11 @@ class FingerReceiver:
         """Return what has arrived since the last call; if nothing has, wait up to `wait_s` for the first."""
         if wait_s:
             select.select([self._pipe], [], [], wait_s)
-        data = self._rest
+        data = b''
         with contextlib.suppress(BlockingIOError):
-            data += os.read(self._pipe, PIPE_BYTES)
-        states: list[FingerState] = []
-        at = 0
-        while len(data) - at >= FORMAT.size:
-            state = FingerState.from_bytes(data[at : at + FORMAT.size])
-            if state is not None:
-                states.append(state)
-                at += FORMAT.size
-            else:
-                self.refused += 1
-                following = data.find(MAGIC, at + 1)
-                at = following if following > 0 else len(data)
-        self._rest = data[at:]
-        self.received += len(states)
-        return states
+            data = os.read(self._pipe, READ_BYTES)  # whole states, as each is written as a whole
+        rows = FORMAT.iter_unpack(data[: len(data) // FORMAT.size * FORMAT.size])
+        return [FingerState(*numbers) for magic, *numbers in rows if magic == MAGIC]
 
     def close(self) -> None:
         """Remove the pipe."""

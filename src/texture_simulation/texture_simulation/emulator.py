@@ -240,8 +240,6 @@ class Emulator:
             'samples': self._sensor.done,
             'skipped samples': self._sensor.skipped,
             'unread bytes': self.device.dropped_bytes,
-            'finger states': self._link.received,
-            'refused finger states': self._link.refused,
         }
 
     def _in_thread(self, command: Callable[[], None]) -> None:

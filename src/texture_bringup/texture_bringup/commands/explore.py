@@ -6,38 +6,60 @@ from __future__ import annotations
 
 import argparse
 import json
+import logging
 import math
+import shutil
+import signal
+import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from texture_bringup.nodes.collector import collect_surface, recorder
-from texture_bringup.operator import ExplorationResult, Operator
+from texture_bringup.operator import ExplorationResult, Operator, Progress
 from texture_core.cli import USER_ERROR, Command, add_namespace, add_parameters, parameters_from
 from texture_core.config import find
-from texture_core.errors import CollectionError, InvalidParameter, MotionAborted, MotionRefused
+from texture_core.errors import (
+    CollectionError,
+    ExplorationError,
+    InvalidData,
+    InvalidParameter,
+    MotionAborted,
+    MotionRefused,
+)
 from texture_core.types import (
     ExplorationRequest,
     ExplorationState,
     RoughnessEstimate,
-    SlideMotion,
     TextureEstimate,
 )
 from texture_estimation.model import load_model
 from texture_estimation.next_motion import slide_values
 from texture_evaluation.check import check_finger, store_reference
-from texture_evaluation.collection import CollectionParams
+from texture_evaluation.collection import (
+    CollectionEnd,
+    CollectionParams,
+    Patch,
+    PlaceAccuracy,
+    PlacePlan,
+    evaluate_places,
+    next_bag,
+)
+from texture_evaluation.collection import collect as collect_places
 from texture_exploration.motions import MOTIONS
 from texture_exploration.presets import load_preset
 from texture_features.correction import read_reference
+from texture_features.feature_set import FeatureSet
 from texture_recordings.dataset import SlideDataset
 
+T = TypeVar('T')
 # Option, field of the request, unit, meaning.
 NUMBERS = (
     ('speed', 'speed_m_s', 'M/S', 'speed along the surface'),
@@ -98,8 +120,8 @@ def _explore(options: argparse.Namespace) -> int:
     try:
         with Operator(options.namespace) as operator:
             operator.wait_for_explorer(EXPLORER_S, SOON_S)
-            while made < len(requests):
-                result = explored(operator, requests[made])
+            for request in requests:
+                result = explored(operator.explore, request)
                 code = max(code, exit_code(result))
                 if options.json:
                     print(json.dumps(as_json(result)), flush=True)
@@ -110,9 +132,7 @@ def _explore(options: argparse.Namespace) -> int:
                 made += 1
     finally:
         if made < len(requests) > 1:
-            left = ' '.join(f'{degrees:g}' for degrees in options.direction[made:])
-            advice = '' if options.preset else f'; go on with --direction {left}'
-            print(f'{made} of {len(requests)} slides were made{advice}', file=sys.stderr)
+            print(f'{made} of {len(requests)} slides were made', file=sys.stderr)
     return code
 
 
@@ -155,35 +175,28 @@ def finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def explored(operator: Operator, request: ExplorationRequest) -> ExplorationResult:
+def explored(explore: Callable[[ExplorationRequest, Progress], T], request: ExplorationRequest) -> T:
     """Explore with a line of progress; after Ctrl-C print how the exploration ended."""
     try:
-        with progress_line():
-            return operator.explore(request, show_progress)
+        try:
+            return explore(request, show_progress)
+        finally:
+            if sys.stderr.isatty():
+                print(file=sys.stderr)
     except KeyboardInterrupt as interrupt:
         print(interrupt, file=sys.stderr)
         raise
 
 
-@contextmanager
-def progress_line() -> Iterator[None]:
-    """End the line of the progress, however the exploration ends."""
-    try:
-        yield
-    finally:
-        if sys.stderr.isatty():
-            print(file=sys.stderr)
-
-
-def print_result(explored: ExplorationResult) -> bool:
+def print_result(result: ExplorationResult) -> bool:
     """Print how an exploration ended; return whether it succeeded."""
-    if not explored.exploration_id:
-        raise MotionRefused(explored.message)
-    print(f'{explored.exploration_id}: {explored.message}')
-    print(f'texture:   {texture_text(explored.texture)}')
-    if explored.roughness.valid or explored.roughness.message:  # else there is no roughness model
-        print(f'roughness: {roughness_text(explored.roughness)}')
-    return bool(explored.success)
+    if not result.exploration_id:
+        raise MotionRefused(result.message)
+    print(f'{result.exploration_id}: {result.message}')
+    print(f'texture:   {texture_text(result.texture)}')
+    if result.roughness.valid or result.roughness.message:  # else there is no roughness model
+        print(f'roughness: {roughness_text(result.roughness)}')
+    return result.success
 
 
 def requests_of(options: argparse.Namespace) -> list[ExplorationRequest]:
@@ -251,7 +264,6 @@ def _configure_identify(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('model', help='trained on slides of several kinds over every texture')
     parser.add_argument('--sure', type=float, default=0.95, metavar='P', help='end at this probability; default: 0.95')
     parser.add_argument('--most', type=int, default=6, metavar='N', help='most slides that are made; default: 6')
-    parser.add_argument('--surface', default='', help='true name of the surface, if known; it labels a recording')
     add_namespace(parser)
 
 
@@ -274,11 +286,21 @@ def _identify(options: argparse.Namespace) -> int:
         while number < options.most and np.exp(belief.max()) < options.sure:
             number += 1
             motion, information = known.best_motion(belief, known.motions)
-            print(f'slide {number}: {motion_text(motion)}; {information:.2f} nats expected')
-            with progress_line():
-                explored, vectors = operator.explore_with_features(request_of(motion, options.surface), show_progress)
-            if not explored.success:
-                return int(not print_result(explored))
+            print(
+                f'slide {number}: {motion.motion}, direction {math.degrees(motion.direction_rad):.0f}°, '
+                f'{motion.speed_m_s:g} m/s, {motion.force_n:g} N, {motion.duration_s:g} s; '
+                f'{information:.2f} nats expected'
+            )
+            request = ExplorationRequest(
+                motion.motion,
+                speed_m_s=motion.speed_m_s,
+                force_n=motion.force_n,
+                distance_m=motion.speed_m_s * motion.duration_s,
+                direction_rad=motion.direction_rad,
+            )
+            result, vectors = explored(operator.explore_with_features, request)
+            if not result.success:
+                return int(not print_result(result))
             belief = known.update(belief, motion, slide_values(vectors, model.feature_set))
             likely = np.argsort(-belief, kind='stable')[:SHOWN]
             print(f'  {", ".join(f"{known.textures[k]} {np.exp(belief[k]):.2f}" for k in likely)}')
@@ -287,28 +309,139 @@ def _identify(options: argparse.Namespace) -> int:
     return 0
 
 
-def request_of(motion: SlideMotion, surface: str) -> ExplorationRequest:
-    """Return the request for a motion."""
-    return ExplorationRequest(
-        motion.motion,
-        speed_m_s=motion.speed_m_s,
-        force_n=motion.force_n,
-        distance_m=motion.speed_m_s * motion.duration_s,
-        direction_rad=motion.direction_rad,
-        surface=surface,
-    )
+# --------------------
+# Collect slides of a surface.
+
+RECIPE = 'default'  # whose features distinguish the places
+RECORDER_S = 30.0  # to start, and to complete the bag
+FLUSHED_S = 20.0  # within which what was recorded can be read: a recorder may be behind
+RECORDED = ('signal', 'exploration')
+PATCH = ('patch_x_low_m', 'patch_x_high_m', 'patch_y_low_m', 'patch_y_high_m')
+LEAST_SPEED_M_S = 0.002  # of every explorer
+LIMITS = ('min_force_n', 'max_force_n', 'max_speed_m_s')
+BAGS_LOG = logging.getLogger('texture_recordings.bags')
 
 
-def motion_text(motion: SlideMotion) -> str:
-    """Return a motion as text."""
-    return (
-        f'{motion.motion}, direction {math.degrees(motion.direction_rad):.0f}°, {motion.speed_m_s:g} m/s, '
-        f'{motion.force_n:g} N, {motion.duration_s:g} s'
+def collect_surface(
+    operator: Operator, surface: str, folder: Path, params: CollectionParams, namespace: str = ''
+) -> tuple[CollectionEnd, Path | None]:
+    """Collect a surface; return how it ended, and the bag, which is complete however that was, Ctrl-C included.
+
+    A bag without any slide is removed; then None is returned instead.
+    """
+    low_x, high_x, low_y, high_y, low_n, high_n, high_m_s = operator.parameters('explorer', (*PATCH, *LIMITS))
+    if not (low_x < high_x and low_y < high_y):
+        raise InvalidData(
+            'no surface patch is taught: touch the corners of the surface with `texture touch-surface`, or give the '
+            f'explorer {", ".join(PATCH)}'
+        )
+    patch = Patch(low_x, high_x, low_y, high_y)
+    plan = PlacePlan(surface, params, patch, (low_n, high_n), (LEAST_SPEED_M_S, high_m_s))
+    folder.mkdir(parents=True, exist_ok=True)
+    bag = folder / next_bag([one.name for one in folder.iterdir()], surface)
+    with recorder(operator, bag, namespace) as check:
+
+        def explore(request: ExplorationRequest) -> tuple[ExplorationError, str]:
+            check()
+            try:
+                explored = operator.explore(request)
+            except (MotionRefused, MotionAborted) as error:
+                return error.error, str(error)
+            return explored.error, explored.message
+
+        end = collect_places(plan, params, explore, partial(_evaluate_bag, bag, surface), _tell)
+    # Where the recorder has ended, the bag there may be another one.
+    if end.slides or end.error is CollectionError.NOT_RECORDED:
+        return end, bag
+    shutil.rmtree(bag, ignore_errors=True)
+    with suppress(OSError):  # other surfaces are in it
+        folder.rmdir()
+    return replace(end, message=f'{end.message}; no slide was made, so no bag is kept'), None
+
+
+def _tell(sentence: str, slides: int) -> None:
+    print(f'{slides} slides: {sentence}', flush=True)
+
+
+def _evaluate_bag(bag: Path, surface: str, slides: int) -> PlaceAccuracy:
+    """Evaluate all bags of the folder, once the newest one has `slides` slides on the disk."""
+    feature_set = FeatureSet.load(RECIPE)
+    deadline_s = time.monotonic() + FLUSHED_S
+    while True:
+        time.sleep(1.0)
+        BAGS_LOG.disabled = True  # the bag that is still recorded has no end yet
+        try:
+            dataset = SlideDataset.from_bags([bag.parent], topics=feature_set.topics)
+        finally:
+            BAGS_LOG.disabled = False
+        written = sum(one.bag == bag for one in dataset)
+        if written >= slides or time.monotonic() > deadline_s:
+            return evaluate_places(dataset.features(feature_set), surface)
+
+
+@contextmanager
+def recorder(operator: Operator, bag: Path, namespace: str) -> Iterator[Callable[[], None]]:
+    """Record a bag in a separate process; the function raises InvalidData, with its last message, if that ended."""
+    operator.wait_for_listeners(RECORDED, 1, lambda: None)  # the feature extractor; by then all others are found
+    wanted = {topic: operator.listeners(topic) + 1 for topic in RECORDED}
+    command = [sys.executable, '-m', 'texture_bringup.command', 'record', str(bag), '--namespace', namespace]
+    with tempfile.TemporaryFile('w+') as output:
+        process = subprocess.Popen(command, stdout=output, stderr=output, start_new_session=True)
+
+        def last_message() -> str:
+            output.seek(0)
+            return output.read().strip().rpartition('\n')[2]
+
+        def check() -> None:
+            if process.poll() is not None:
+                raise InvalidData(f'the recorder ended: {last_message()}')
+
+        try:
+            for topic, number in wanted.items():
+                operator.wait_for_listeners((topic,), number, check)
+            yield check
+        finally:
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+            try:
+                process.wait(RECORDER_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+
+
+# Parameters whose options are shorter; both numbers of a range follow one option.
+SHORTER = ('distance_m', 'speed_low_m_s', 'speed_high_m_s', 'force_low_n', 'force_high_n')
+
+
+def _configure_collect(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument('surface', help='label of the surface under the finger')
+    parser.add_argument('folder', type=Path, help='folder of the bags of all surfaces; made if missing')
+    shape: dict[str, Any] = {'type': float, 'nargs': 2, 'default': (0.0, 0.0), 'metavar': ('LOW', 'HIGH')}
+    parser.add_argument('--speed', help='speeds of the slides (default: 0.02 to 0.05), m/s', **shape)
+    parser.add_argument('--force', help='normal forces of the slides (default: 1 to 2), N', **shape)
+    add_parameters(parser, CollectionParams, without=SHORTER)
+    parser.add_argument(
+        '--distance', type=float, default=0.04, metavar='M', help='length of each slide (default: 0.04)'
     )
+    add_namespace(parser)
+
+
+def _collect(options: argparse.Namespace) -> int:
+    """Collect, and report how well left-out places are recognised; return 0 if the bound is met, else 1."""
+    given = dict(zip(SHORTER, (options.distance, *options.speed, *options.force), strict=True))
+    params = parameters_from(options, CollectionParams, given)
+    with Operator(options.namespace) as operator:
+        operator.wait_for_explorer(EXPLORER_S, SOON_S)
+        end, bag = collect_surface(operator, options.surface, options.folder, params, options.namespace)
+    kept = f"; {end.slides} slides in '{bag}'" if bag else ''
+    print(f'{end.message}{kept}', file=sys.stderr if end.error else sys.stdout)
+    if end.error is CollectionError.CANCELLED:
+        raise KeyboardInterrupt
+    return 0 if end.error is CollectionError.NONE else 1
 
 
 # --------------------
-# Collect slides of a surface; check the finger on the reference plate.
+# Check the finger on the reference plate.
 
 PLATE = 'reference plate'
 # By option: field of the request, unit, meaning, and default where no reference gives one.
@@ -320,47 +453,6 @@ PLATE_NUMBERS = {
 }
 
 
-# Option, lowest and highest of the collection, unit, meaning.
-RANGES = (
-    ('speed', ('speed_low_m_s', 'speed_high_m_s'), 'm/s', 'speeds of the slides (default: 0.02 to 0.05)'),
-    ('force', ('force_low_n', 'force_high_n'), 'N', 'normal forces of the slides (default: 1 to 2)'),
-)
-IN_RANGES = tuple(name for _, names, _, _ in RANGES for name in names)
-
-
-def _configure_collect(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument('surface', help='label of the surface under the finger')
-    parser.add_argument('folder', type=Path, help='folder of the bags of all surfaces; made if missing')
-    for option, _, unit, meaning in RANGES:
-        parser.add_argument(f'--{option}', type=float, nargs=2, metavar=('LOW', 'HIGH'), help=f'{meaning}, {unit}')
-    add_parameters(parser, CollectionParams, without=(*IN_RANGES, 'distance_m'))
-    parser.add_argument('--distance', type=float, metavar='M', help='length of each slide (default: 0.04)')
-    add_namespace(parser)
-
-
-def _collect(options: argparse.Namespace) -> int:
-    """Collect, and report how well left-out places are recognised; return 0 if the bound is met, else 1."""
-    given = {'distance_m': options.distance} if options.distance is not None else {}
-    for option, names, _, _ in RANGES:
-        given |= dict(zip(names, getattr(options, option) or (), strict=False))
-    params = parameters_from(options, CollectionParams, given)
-    with Operator(options.namespace) as operator:
-        operator.wait_for_explorer(EXPLORER_S, SOON_S)
-        end, bag = collect_surface(
-            operator,
-            options.surface,
-            options.folder,
-            params,
-            lambda sentence, slides: print(f'{slides} slides: {sentence}', flush=True),
-            namespace=options.namespace,
-        )
-    kept = f"; {end.slides} slides in '{bag}'" if bag else ''
-    print(f'{end.message}{kept}', file=sys.stderr if end.error else sys.stdout)
-    if end.error is CollectionError.CANCELLED:
-        raise KeyboardInterrupt
-    return 0 if end.error is CollectionError.NONE else 1
-
-
 def _configure_check(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('model', help='path of the model; reference and correction are next to it')
     parser.add_argument(
@@ -369,7 +461,6 @@ def _configure_check(parser: argparse.ArgumentParser) -> None:
         help='slide twice, and store that as the slide of the finger of the training, if both agree',
     )
     parser.add_argument('--correct', action='store_true', help='write the correction of gain and response, if needed')
-    parser.add_argument('--bag', help='take the last labelled slide of a bag instead of sliding now')
     for option, (_, unit, meaning, usual) in PLATE_NUMBERS.items():
         shown = f'{meaning}, {unit}; default: that of the reference, or {usual:g}'
         parser.add_argument(f'--{option}', type=float, help=shown)
@@ -381,11 +472,10 @@ def _check(options: argparse.Namespace) -> int:
     # Report what is missing before the robot moves.
     topics = load_model(options.model).recipe.feature_set.topics
     reference, made = ({}, {}) if options.store else read_reference(options.model)
-    request = None if options.bag else plate_request(options, made)
+    request = plate_request(options, made)
     with tempfile.TemporaryDirectory() as folder:
-        bag = Path(options.bag) if options.bag else Path(folder) / 'plate'
-        if request:
-            slide_over_plate(bag, request, options.namespace, 2 if options.store else 1)
+        bag = Path(folder) / 'plate'
+        slide_over_plate(bag, request, options.namespace, 2 if options.store else 1)
         slides = SlideDataset.from_bags([bag]).slides
     if options.store:
         print(store_reference(options.model, topics, slides, request))
@@ -397,11 +487,11 @@ def _check(options: argparse.Namespace) -> int:
 
 def plate_request(options: argparse.Namespace, stored: Mapping[str, float]) -> ExplorationRequest:
     """Return the slide over the plate: an option goes before what is stored with the reference."""
-    numbers: dict[str, Any] = {field: stored.get(field, usual) for field, _, _, usual in PLATE_NUMBERS.values()}
-    given = {option: getattr(options, option) for option in PLATE_NUMBERS}
-    if given['direction'] is not None:
-        given['direction'] = math.radians(given['direction'])
-    numbers |= {PLATE_NUMBERS[option][0]: value for option, value in given.items() if value is not None}
+    numbers: dict[str, Any] = {}
+    for option, (field, _, _, usual) in PLATE_NUMBERS.items():
+        given = getattr(options, option)
+        in_rad = math.radians if option == 'direction' else float
+        numbers[field] = stored.get(field, usual) if given is None else in_rad(given)
     return ExplorationRequest('linear_slide', surface=PLATE, **numbers)
 
 

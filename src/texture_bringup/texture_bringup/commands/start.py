@@ -42,7 +42,7 @@ def _configure_launch(parser: argparse.ArgumentParser) -> None:
 
 
 def _launch(options: argparse.Namespace) -> int:
-    """Run the nodes until they end or Ctrl-C; return 1 if one died, else 0."""
+    """Run the nodes until they end or Ctrl-C; return 2 if a needed one was started wrongly, 1 if one died, else 0."""
     if options.parent is not None:
         end_with(options.parent, signal.SIGINT)
     path = find_launch_file(options.file)
@@ -149,16 +149,14 @@ def _configure_demo(parser: argparse.ArgumentParser) -> None:
 
 def _demo(options: argparse.Namespace) -> int:
     """Run the demonstration; return 1 if an answer was not as expected."""
-    from texture_bringup.demo import DemoPlan, ProgressLog, demonstrate
+    from texture_bringup.demo import ProgressLog, demonstrate
     from texture_estimation.recipe import load_recipe
 
     load_recipe(options.recipe)  # refused before the nodes start
     progress = ProgressLog()
     progress.line('Everything physical in this demonstration is simulated: surfaces, arm and sensor.')
-    all_right = demonstrate(
-        options.out, options.recipe, options.seed, DemoPlan(), progress, dashboard=options.dashboard
-    )
-    return 0 if all_right else 1
+    right = demonstrate(options.out, options.recipe, options.seed, progress, dashboard=options.dashboard)
+    return 0 if right else 1
 
 
 launch = Command('start the nodes of a launch file', _configure_launch, _launch)

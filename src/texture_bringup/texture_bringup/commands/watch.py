@@ -17,7 +17,7 @@ from rich.text import Text
 
 from texture_bringup.feed import FRAME_PERIOD_S, Feed
 from texture_core.cli import add_namespace
-from texture_core.errors import ExplorationError, InvalidParameter
+from texture_core.errors import ExplorationError
 from texture_core.types import NANOSECONDS
 
 BAR, LABELS = 30, 5
@@ -28,21 +28,18 @@ Frame = Mapping[str, Any]
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the sub-command."""
     parser.add_argument('bag', nargs='?', help='bag to show instead of the running nodes')
-    parser.add_argument('--rate', type=float, default=1.0, help='how many times faster than recorded a bag is shown')
     add_namespace(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Show what happens until Ctrl-C or the end of the bag: a picture on a terminal, else a line for each change."""
-    if not options.rate > 0.0:
-        raise InvalidParameter(f'--rate is {options.rate:g}; a number above 0 is needed')
     feed, console = Feed(), Console()
     live = Live(console=console, auto_refresh=False) if console.is_terminal else nullcontext()
     try:
         with live:
             show = _picture(feed, live) if isinstance(live, Live) else _lines(feed)
             if options.bag:
-                _play(options.bag, options.rate, options.namespace, feed, show)
+                _play(options.bag, options.namespace, feed, show)
             else:
                 from texture_bringup.operator import Operator  # noqa: PLC0415 - a bag is shown without ROS
 
@@ -53,13 +50,13 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _play(bag: str, rate: float, namespace: str, feed: Feed, show: Callable[[], None]) -> None:
+def _play(bag: str, namespace: str, feed: Feed, show: Callable[[], None]) -> None:
     """Give the messages of a bag to the feed at their pace."""
     from texture_recordings.bags import read_bag  # noqa: PLC0415 - nothing else needs it
 
     last_ns, feed.recorded = None, True
     for topic, log_ns, value in read_bag(bag, feed.topics, namespace or None):
-        pause_s = 0.0 if last_ns is None else (log_ns - last_ns) / NANOSECONDS / rate
+        pause_s = 0.0 if last_ns is None else (log_ns - last_ns) / NANOSECONDS
         time.sleep(min(max(0.0, pause_s), LONGEST_PAUSE_S))
         last_ns = log_ns
         feed.topics[topic][1](value)

@@ -17,6 +17,7 @@ from texture_core.config import param
 from texture_core.errors import DeviceError, LaunchFailed
 from texture_core.ros import declare, run
 
+LIFECYCLE = ('sensor', 'explorer')  # which of the nodes are configured and activated
 STOPPED = threading.Event()  # this process was asked to end
 
 
@@ -27,9 +28,6 @@ class BringUpParams:
     nodes: str = param(
         'sensor feature_extractor classifier explorer',
         'Nodes, separated by spaces, in the order in which they are waited for.',
-    )
-    lifecycle_nodes: str = param(
-        'sensor explorer', 'Which of the nodes are configured and activated, separated by spaces.'
     )
     timeout_s: float = param(
         60.0, 'How long each node may take to appear and to answer.', unit='s', low=0.1, high=3600.0
@@ -42,12 +40,12 @@ class BringUp(Node):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('bring_up', **kwargs)
         params = declare(self, BringUpParams)
-        names, lifecycle = params.nodes.split(), params.lifecycle_nodes.split()
+        names = params.nodes.split()
         with Operator(self.get_namespace(), guard=_end_when_stopped) as operator:
             for place, name in enumerate(names, start=1):
                 try:
                     operator.wait_for_node(name, params.timeout_s)
-                    state = operator.set_active(name, True) if name in lifecycle else 'there'
+                    state = operator.set_active(name, True) if name in LIFECYCLE else 'there'
                 except LaunchFailed as error:
                     later = f'; not activated or not reached: {", ".join(names[place:])}' if names[place:] else ''
                     raise DeviceError(f'{error}{later}') from error

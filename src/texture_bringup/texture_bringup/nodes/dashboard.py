@@ -10,40 +10,34 @@ import json
 import signal
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from action_msgs.msg import GoalStatus
-from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.action import ActionClient
 from rclpy.node import Node
-from rclpy.parameter_client import AsyncParameterClient
 from std_srvs.srv import Trigger
-from texture_msgs import action, msg, srv
+from texture_msgs import msg
 
 from texture_bringup.dashboard import Access, Recorder, Serving, make_app
 from texture_bringup.feed import FRAME_PERIOD_S, Feed
-from texture_bringup.operator import GONE_S, RESTARTED, VANISHED, answer_of, note_diagnostics, ready, subscribe
+from texture_bringup.operator import Operator, subscribe
 from texture_core.config import folder, from_mapping, param
-from texture_core.errors import InvalidData, InvalidParameter, LaunchFailed, MotionAborted
+from texture_core.errors import InvalidData, InvalidParameter, LaunchFailed
 from texture_core.ros import (
-    STATE_QOS,
     DiagnosticReport,
     Diagnostics,
     declare,
     quality_of_service,
     run,
-    to_msg,
 )
 from texture_core.types import ExplorationRequest, checked_label
 from texture_features.correction import read_reference
 
-ANSWER_DEADLINE_S = 30.0
-RETRY_PERIOD_S = 2.0
+T = TypeVar('T')
+EXPLORER_S, ANSWER_DEADLINE_S, POLL_S = 5.0, 30.0, 0.02
 MAX_CHARACTERS = 200
 
 
@@ -69,11 +63,11 @@ class DashboardNode(Node):
         self._feed = Feed()
         self._info = msg.ExplorerInfo()
         self._bad = 0
-        self._heard_s = 0.0  # of the explorer
+        self._closing = False
         self._recordings = Path(params.recordings).expanduser()
         self._command: asyncio.subprocess.Process | None = None
         self._recorder = Recorder(self._recordings, self.get_namespace())
-        self._make_clients()
+        self._stop = self.create_client(Trigger, 'explorer/stop')
         access = Access.to_this_machine(params.host)
         self._serving = Serving(
             make_app(self, access, folder('texture_bringup', 'config/dashboard')), params.host, params.port
@@ -86,6 +80,7 @@ class DashboardNode(Node):
 
     def shutdown(self) -> None:
         """Complete a recording, stop a sub-command, and close the page."""
+        self._closing = True
         if self._command is not None:
             with contextlib.suppress(ProcessLookupError):
                 self._command.send_signal(signal.SIGINT)
@@ -99,39 +94,36 @@ class DashboardNode(Node):
         if 'motion' not in asked:
             raise InvalidParameter('no motion is requested; give its name as `motion`')
         request = from_mapping(ExplorationRequest, {name: _short(value) for name, value in asked.items()})
-        await ready(self._explorer.server_is_ready, 'explorer')
-        wanted = action.Explore.Goal(request=to_msg(request))
-        goal = await answer_of(self._explorer.send_goal_async(wanted), ANSWER_DEADLINE_S)
-        self._heard_s = time.monotonic()
-        while time.monotonic() - self._heard_s < GONE_S:
-            try:
-                answer = await answer_of(goal.get_result_async(), RETRY_PERIOD_S)
-            except LaunchFailed:
-                continue
-            if answer.status == GoalStatus.STATUS_UNKNOWN:
-                raise MotionAborted(RESTARTED)
-            result = answer.result.result
-            success = result.error_code == msg.ExplorationResult.ERROR_NONE
-            return {'success': success, 'message': result.message, 'id': result.exploration_id}
-        raise MotionAborted(VANISHED)
+
+        def explore(operator: Operator) -> Mapping[str, Any]:
+            operator.wait_for_explorer(EXPLORER_S)
+            result = operator.explore(request)
+            return {'success': result.success, 'message': result.message, 'id': result.exploration_id}
+
+        return await self._operate(explore)
 
     async def stop(self, _requested: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Stop what moves."""
-        return await self._ask(self._stop, Trigger.Request(), 'explorer')
+        """Stop what moves, by a client that exists all the time: here nothing is waited for that can be avoided."""
+        if not self._stop.service_is_ready():
+            raise LaunchFailed('no explorer answers; is it running?')
+        future, deadline_s = self._stop.call_async(Trigger.Request()), time.monotonic() + ANSWER_DEADLINE_S
+        while not future.done():
+            if time.monotonic() > deadline_s:
+                raise LaunchFailed(f'no answer within {ANSWER_DEADLINE_S:.0f} s')
+            await asyncio.sleep(POLL_S)
+        return {'success': future.result().success, 'message': future.result().message}
 
     async def tare(self, _asked: Mapping[str, Any]) -> Mapping[str, Any]:
         """Take the present level of the sensor as that without load."""
-        return await self._ask(self._tare, Trigger.Request(), 'sensor')
+        return await self._call('sensor/tare', 'start a sensor')
 
     async def recover(self, _asked: Mapping[str, Any]) -> Mapping[str, Any]:
         """Free the arm from a fault."""
-        return await self._ask(self._recover, Trigger.Request(), 'explorer')
+        return await self._call('explorer/recover', 'start an explorer')
 
     async def check(self, _asked: Mapping[str, Any]) -> Mapping[str, Any]:
         """Slide over the reference plate, and compare it with that of the training of the classifier's model."""
-        await ready(self._model.services_are_ready, 'classifier')
-        answer = await answer_of(self._model.get_parameters(['model']), ANSWER_DEADLINE_S)
-        path = answer.values[0].string_value
+        [path] = await self._operate(lambda operator: operator.parameters('classifier', ['model']))
         if not path:
             raise InvalidParameter('the classifier has no model whose reference could be compared; start it with one')
         read_reference(path)  # without one nothing need move
@@ -147,12 +139,12 @@ class DashboardNode(Node):
     async def add(self, asked: Mapping[str, Any]) -> Mapping[str, Any]:
         """Add an exploration, the last one if it has no id, or remove the last added slide."""
         if asked.get('undo'):
-            return await self._ask(self._undo, Trigger.Request(), 'classifier')
+            return {'success': True, 'message': await self._operate(Operator.remove_last_added)}
         label, exploration = (_short(str(asked.get(name, ''))).strip() for name in ('label', 'id'))
         if not label:
             raise InvalidParameter('the texture to add has no name; give one')
-        request = srv.AddTexture.Request(label=label, exploration_id=exploration)
-        return await self._ask(self._learn, request, 'classifier')
+        _, message = await self._operate(lambda operator: operator.add(label, exploration))
+        return {'success': True, 'message': message}
 
     async def record(self, asked: Mapping[str, Any]) -> Mapping[str, Any]:
         """Begin or end a recording; where it goes is not the page's choice."""
@@ -171,28 +163,14 @@ class DashboardNode(Node):
 
     # ROS
 
-    def _make_clients(self) -> None:
-        self._explorer = ActionClient(self, action.Explore, 'explore')
-        self._stop = self.create_client(Trigger, 'explorer/stop')
-        self._learn = self.create_client(srv.AddTexture, 'classifier/add_texture')
-        self._undo = self.create_client(Trigger, 'classifier/remove_last_added')
-        self._tare = self.create_client(Trigger, 'sensor/tare')
-        self._recover = self.create_client(Trigger, 'explorer/recover')
-        self._model = AsyncParameterClient(self, 'classifier')
-
     def _subscribe(self) -> None:
         subscribe(self, self._feed, self._on_bad)
-        self.create_subscription(msg.ExplorationState, 'exploration', self._on_state, STATE_QOS, raw=True)
         qos = quality_of_service('explorer_info')
         self.create_subscription(msg.ExplorerInfo, 'explorer_info', partial(setattr, self, '_info'), qos)
-        self.create_subscription(DiagnosticArray, '/diagnostics', partial(note_diagnostics, self, self._feed), 100)
 
     def _on_bad(self, error: InvalidData) -> None:
         self._bad += 1
         self.get_logger().warning(f'left out: {error}', throttle_duration_sec=10.0)
-
-    def _on_state(self, _data: bytes) -> None:
-        self._heard_s = time.monotonic()
 
     def _show(self) -> None:
         self._recorder.watch()
@@ -224,11 +202,22 @@ class DashboardNode(Node):
         finally:
             self._command, self._feed.working = None, ''
 
-    async def _ask(self, client: Any, request: Any, node: str) -> Mapping[str, Any]:
-        await ready(client.service_is_ready, node)
-        answer = await answer_of(client.call_async(request), ANSWER_DEADLINE_S)
-        success = answer.success if isinstance(request, Trigger.Request) else not answer.error_code
-        return {'success': success, 'message': answer.message}
+    async def _call(self, service: str, advice: str) -> Mapping[str, Any]:
+        success, message = await self._operate(lambda operator: operator.call(service, advice))
+        return {'success': success, 'message': message}
+
+    async def _operate(self, work: Callable[[Operator], T]) -> T:
+        """Let an operator do something in another thread; it is left when the page closes."""
+
+        def operate() -> T:
+            with Operator(self.get_namespace(), guard=self._check_open) as operator:
+                return work(operator)
+
+        return await asyncio.get_running_loop().run_in_executor(None, operate)
+
+    def _check_open(self) -> None:
+        if self._closing:
+            raise LaunchFailed('the dashboard was closed')
 
 
 def _short(value: Any) -> Any:

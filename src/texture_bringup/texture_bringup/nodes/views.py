@@ -26,7 +26,6 @@ from texture_core.errors import TextureError
 from texture_core.ros import SENSOR_QOS, STATE_QOS, DiagnosticReport, Diagnostics, declare, from_msg, run, to_stamp
 from texture_core.types import NANOSECONDS, ExplorationState, Phase, TactileSignal
 
-WATCH_S = 0.5  # period of the check for subscribers
 PATH_S = 0.2  # how often the path is drawn anew
 PATH_POINTS = 5000
 PATH_WIDTH_M = 0.001
@@ -99,37 +98,27 @@ class Views(Node):
         self._power = 0.0  # of the newest batch
         self._state: ExplorationState | None = None
         self._bad = 0
-        signal, state = (msg.TactileSignal, SENSOR_QOS), (msg.ExplorationState, STATE_QOS)
-        # The topics that each view is made of, and what takes their messages.
-        sources = {
-            'signal': [('signal', signal, self._draw)],
-            'taxels': [('signal_static', signal, self._show_taxels)],
-            'wrench': [('signal_wrench', signal, self._show_wrench)],
-            'path': [('signal', signal, self._note_power), ('exploration', state, self._follow)],
-        }
-        self._views: list[tuple[Any, list[Any], list[Any]]] = [
-            (self.create_publisher(kind, f'~/{name}', VIEW_QOS), sources[name], []) for name, kind in VIEW_TYPES.items()
-        ]
-        self._curve, self._image, self._wrench, self._path = (view for view, _, _ in self._views)
-        self.create_timer(WATCH_S, self._watch)
+        self._curve, self._image, self._wrench, self._path = (
+            self.create_publisher(kind, f'~/{name}', VIEW_QOS) for name, kind in VIEW_TYPES.items()
+        )
+        # By topic: the view that is made of it, and what takes its messages.
+        for topic, view, take in (
+            ('signal', self._curve, self._draw),
+            ('signal_static', self._image, self._show_taxels),
+            ('signal_wrench', self._wrench, self._show_wrench),
+            ('signal', self._path, self._note_power),
+        ):
+            self.create_subscription(msg.TactileSignal, topic, self._taking(view, take), SENSOR_QOS)
+        self.create_subscription(msg.ExplorationState, 'exploration', self._taking(self._path, self._follow), STATE_QOS)
         self.create_timer(PATH_S, self._draw_path)
         Diagnostics(self, self._report)
 
-    def _watch(self) -> None:
-        """Subscribe to what the watched views are made of, and to nothing else."""
-        for publisher, sources, subscriptions in self._views:
-            watched = publisher.get_subscription_count() > 0
-            if watched and not subscriptions:
-                subscriptions += [
-                    self.create_subscription(kind, topic, self._taking(take), qos)
-                    for topic, (kind, qos), take in sources
-                ]
-            elif not watched:
-                while subscriptions:
-                    self.destroy_subscription(subscriptions.pop())
+    def _taking(self, view: Any, take: Callable[[Any], None]) -> Callable[[Any], None]:
+        """Return what takes a message while a view has a subscriber."""
 
-    def _taking(self, take: Callable[[Any], None]) -> Callable[[Any], None]:
         def on_message(message: Any) -> None:
+            if not view.get_subscription_count():
+                return
             try:
                 value = from_msg(message)
             except TextureError as error:
@@ -186,7 +175,8 @@ class Views(Node):
         self._path.publish(path)
 
     def _report(self) -> DiagnosticReport:
-        watched = [publisher.topic_name for publisher, _, subscriptions in self._views if subscriptions]
+        views = (self._curve, self._image, self._wrench, self._path)
+        watched = [view.topic_name for view in views if view.get_subscription_count()]
         message = f'shows {", ".join(watched)}' if watched else 'no subscriber, so nothing is computed'
         return 'WARN' if self._bad else 'OK', message, {'bad_messages': self._bad}
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 import argparse
 
 from texture_core.cli import Command, add_namespace, add_slides
-from texture_core.config import check_option
+from texture_core.config import from_mapping
 from texture_core.ros import run_node
 from texture_recordings.nodes.record import RecordNode
 from texture_recordings.nodes.replay import ReplayNode, ReplayParams
@@ -36,7 +36,7 @@ def _configure_replay(parser: argparse.ArgumentParser) -> None:
 
 
 def _replay(options: argparse.Namespace) -> int:
-    check_option(ReplayParams, 'rate', options.rate)
+    from_mapping(ReplayParams, {'rate': options.rate})  # refused in one sentence
     parameters = {'bag': options.bag, 'rate': options.rate, 'slides': options.slides, 'clock': options.clock}
     run_node(ReplayNode, {**parameters, 'deadline_s': RUNNING_S}, options.namespace)
     return 0

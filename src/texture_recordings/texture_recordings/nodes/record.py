@@ -85,12 +85,12 @@ class RecordNode(Node):
         for name, types in self.get_topic_names_and_types():
             ours = name.startswith(f'{self._namespace}/') and (self._all or types[0] in MESSAGES)
             if name not in self._seen and (ours or name in COMMON):
-                if types[0] in typestore().types:
-                    offered = [info.qos_profile for info in self.get_publishers_info_by_topic(name)]
-                    self._subscribe(name, types[0], offered[0] if offered else QoSProfile(depth=100))
-                else:
+                if types[0] not in typestore().types:
                     self._seen.add(name)
                     self.get_logger().warning(f"'{name}' is not recorded: bags cannot hold {types[0]}")
+                elif publishers := self.get_publishers_info_by_topic(name):
+                    # Not before: who only listens does not tell what is offered, and a wrong wish gets nothing.
+                    self._subscribe(name, types[0], publishers[0].qos_profile)
 
     def _subscribe(self, name: str, msgtype: str, offered: QoSProfile) -> None:
         self._seen.add(name)

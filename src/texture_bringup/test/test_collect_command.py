@@ -6,7 +6,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from texture_bringup.nodes import collector
+from texture_bringup.commands import explore
 from texture_bringup.operator import ExplorationResult
 from texture_core.errors import CollectionError, ExplorationError, InvalidData, InvalidParameter
 from texture_core.types import RoughnessEstimate, TextureEstimate
@@ -53,9 +53,8 @@ def collected(monkeypatch, tmp_path):
             (bag / 'cork.mcap').touch()
             yield check
 
-        monkeypatch.setattr(collector, 'recorder', recorder)
-        asked = CollectionParams(**params)
-        return collector.collect_surface(explorer, 'cork', tmp_path, asked, lambda _text, _slides: None)
+        monkeypatch.setattr(explore, 'recorder', recorder)
+        return explore.collect_surface(explorer, 'cork', tmp_path, CollectionParams(**params))
 
     return collected
 
