@@ -213,6 +213,10 @@ def build() -> None:
         '_ROS_WHEELS_BOOTSTRAP_COMPLETE': '1',
         'PYTHONWARNINGS': 'ignore',
     }
+    # A message that is gone leaves code that refers to it, so all of them are built anew.
+    generated = {path.stem for path in (ROOT / 'build/texture_msgs/rosidl_adapter').glob('*/*/*.idl')}
+    if generated - {path.stem for path in (ROOT / 'src/texture_msgs').glob('*/*')}:
+        shutil.rmtree(ROOT / 'build/texture_msgs')
     # Errors only: colcon warns that the prefix of the wheels has no setup file, and this build needs none there.
     colcon = [PYTHON, '-m', 'colcon', '--log-level', 'error']
     quiet = ['--event-handlers', 'console_direct-', 'console_stderr-', 'summary+']
