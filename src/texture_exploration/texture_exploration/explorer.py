@@ -339,6 +339,8 @@ class Explorer:
             exploration.run(Pacer(PERIOD_S, self.clock))
         finally:
             self._lift_first, self.lifted = not exploration.outcome.success, exploration.outcome.lifted
+            if exploration.outcome.success:  # zeroed and free: what the sensor showed before is of no use
+                self._zero_n = None
             self.counts['done' if exploration.outcome.success else 'aborted'] += 1
             self.counts['internal_errors'] += exploration.outcome.error is ExplorationError.INTERNAL
             self.counts['late_steps'] += exploration.gaps

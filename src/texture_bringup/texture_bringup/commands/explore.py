@@ -407,6 +407,7 @@ def recorder(operator: Operator, bag: Path, namespace: str) -> Iterator[Callable
                 process.wait(RECORDER_S)
             except subprocess.TimeoutExpired:
                 process.kill()
+                process.wait()
 
 
 # Parameters whose options are shorter; both numbers of a range follow one option.

@@ -104,8 +104,11 @@ class DashboardNode(Node):
 
     async def stop(self, _requested: Mapping[str, Any]) -> Mapping[str, Any]:
         """Stop what moves, by a client that exists all the time: here nothing is waited for that can be avoided."""
-        if not self._stop.service_is_ready():
-            raise LaunchFailed('no explorer answers; is it running?')
+        found_s = time.monotonic() + EXPLORER_S
+        while not self._stop.service_is_ready():
+            if time.monotonic() > found_s:
+                raise LaunchFailed('no explorer answers; is it running?')
+            await asyncio.sleep(POLL_S)
         future, deadline_s = self._stop.call_async(Trigger.Request()), time.monotonic() + ANSWER_DEADLINE_S
         while not future.done():
             if time.monotonic() > deadline_s:

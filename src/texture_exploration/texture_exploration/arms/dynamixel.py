@@ -155,6 +155,7 @@ class DynamixelBus:
             self.write(motor, 'torque_enable', 1)
             self._energised.add(motor)
             self.missing.discard(motor)
+            self._reasons.pop(motor, None)
 
     def why_missing(self, motor: int) -> str:
         """Return why a motor is missing, as text."""
@@ -258,7 +259,8 @@ class DynamixelBus:
 
     def write_goals(self, goals: Mapping[int, tuple[float, float]]) -> None:
         """Send highest current (A; no more than the motor's limit) and position (rad) of motors."""
-        present = {motor: goal for motor, goal in goals.items() if motor not in self.missing}
+        # A silent motor may still hear: it is not to keep an older goal.
+        present = {m: goal for m, goal in goals.items() if m not in self.missing or m in self._energised}
         currents = {motor: self._counts(motor, current_a) for motor, (current_a, _) in present.items()}
         self._goal_currents.update(currents)
         self._sync_write('goal_current', currents)
