@@ -4,6 +4,7 @@
 
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -161,6 +162,16 @@ class Line:
 
     def poll(self):
         return None
+
+
+def test_an_answer_of_the_guard_that_cannot_be_read_is_counted_and_no_sign_of_life(monkeypatch):
+    line = Line(monkeypatch)
+    line.answers += [b'1 abcdef', b'shared memory port 7413 is taken']
+    assert line.guard.fault() == ''
+    line.answers += [b'\xff\xfe', b'nothing']
+    line.now_s += 2.0
+    assert re.search(r'is silent for 2\.0 s; 3 of its answers could not be read', line.guard.fault())
+    assert (line.guard.reached, line.guard.participant, line.guard.garbled) == (1, 'abcdef', 3)
 
 
 def test_a_busy_machine_may_hold_up_the_guard_for_1_5_s(monkeypatch):

@@ -113,6 +113,7 @@ class TwistGuard(GuardProcess):
         super().__init__(__name__, namespace, *topics, start=scope(), holds=(lock,))
         self.reached = 0  # subscribers that it has found; discovery takes a while and must precede a failure
         self.participant = ''
+        self.garbled = 0  # answers that could not be read
         self._heard_s = 0.0
         self._moving = False
 
@@ -120,13 +121,19 @@ class TwistGuard(GuardProcess):
         """Return in a sentence why the guard would not stop the arm, '' if it would or is still starting."""
         with contextlib.suppress(OSError):
             while answer := self.line.recv(4096):
-                reached, self.participant = answer.decode().split()
-                self.reached, self._heard_s = int(reached), time.monotonic()
+                reached, _, sender_of_guard = answer.decode('ascii', 'replace').partition(' ')
+                if not (reached.isdigit() and sender_of_guard):
+                    self.garbled += 1
+                    continue
+                self.reached, self.participant, self._heard_s = int(reached), sender_of_guard, time.monotonic()
         if self._process.poll() is not None:
             return 'the guard process, which would stop the arm if this process dies, has ended'
         silent_s = time.monotonic() - self._heard_s
         if self._heard_s and silent_s > SILENT_S:
-            return f'the guard process, which would stop the arm if this process dies, is silent for {silent_s:.1f} s'
+            return (
+                f'the guard process, which would stop the arm if this process dies, is silent for {silent_s:.1f} s; '
+                f'{self.garbled} of its answers could not be read'
+            )
         return ''
 
     def beat(self, *, moving: bool) -> None:
