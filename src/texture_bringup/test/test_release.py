@@ -69,6 +69,24 @@ def test_a_workflow_ends_and_may_not_write_the_repository(workflow: Path) -> Non
         assert job.get('permissions', {}).get('contents', 'read') == 'read'
 
 
+def test_the_profile_for_loopback_knows_no_other_address() -> None:
+    profile = ElementTree.parse(ROOT / 'src/texture_bringup/config/fastdds/loopback.xml')
+    named = {element.tag.partition('}')[2]: element.text for element in profile.iter()}
+    assert (named['address'], named['useBuiltinTransports']) == ('127.0.0.1', 'false')
+    assert [element.text for element in profile.findall('.//{*}type')] == ['UDPv4', 'SHM']
+
+
+def test_the_profile_for_restarts_shortens_no_lease_and_uses_no_shared_memory() -> None:
+    profile = ElementTree.parse(ROOT / 'src/texture_bringup/config/fastdds/restart.xml')
+    tags = [element.tag.partition('}')[2] for element in profile.iter()]
+    assert 'leaseDuration' not in tags  # a short one loses nodes that live
+    assert profile.findall('.//{*}locator/{*}udpv4') and not profile.findall('.//{*}locator/{*}shared_memory')
+    announcement, heartbeat = (
+        profile.findtext(f'.//{{*}}{name}/{{*}}nanosec') for name in ('leaseAnnouncement', 'heartbeatPeriod')
+    )
+    assert (announcement, heartbeat) == ('500000000', '200000000')
+
+
 def test_the_service_is_stopped_as_by_ctrl_c_and_never_started_again_by_itself() -> None:
     text = (ROOT / 'src/texture_bringup/config/systemd/tactile-texture.service').read_text()
     unit = configparser.ConfigParser(strict=False, interpolation=None)
