@@ -14,7 +14,7 @@ from texture_exploration import force_control, guards, lift_first, safety, stage
 from texture_exploration.arms.arm import STANDSTILL
 from texture_exploration.arms.simulated import SimulatedArmParams
 from texture_exploration.explorer import PERIOD_S
-from texture_exploration.motion import LIMITS, STATES, state_table
+from texture_exploration.motion import STATES, limit_table, state_table
 from texture_exploration.motions import MOTIONS
 
 PAGE = Path(__file__).parents[3] / 'docs' / 'motion.md'
@@ -23,7 +23,7 @@ PAGE = Path(__file__).parents[3] / 'docs' / 'motion.md'
 def test_the_page_shows_the_states_and_the_limits_of_the_code():
     page = PAGE.read_text(encoding='utf-8')
     assert state_table() in page
-    assert LIMITS in page
+    assert limit_table() in page
 
 
 def kind(command):
@@ -76,7 +76,7 @@ def test_every_limit_of_the_table_is_a_name_of_the_code():
     known = {name for module in (force_control, lift_first, safety, touch, watches) for name in vars(module)}
     for given in (safety.SafetyLimits, safety.CommandLimits, guards.SignalWatchParams, touch.TouchParams):
         known |= {*vars(given), *given.__dataclass_fields__}
-    for name in re.findall(r'^\| `(.*?)`', LIMITS, re.MULTILINE):
+    for name in re.findall(r'^\| `(.*?)`', limit_table(), re.MULTILINE):
         assert {*name.replace(', …', '').replace(' to ', ', ').split(', ')} <= known
 
 
@@ -117,4 +117,4 @@ def test_the_sentences_of_the_pages_hold_the_limits_of_the_code():
 
 
 def test_each_step_of_the_table_is_the_period_of_the_explorer():
-    assert f'each step, {1e3 * PERIOD_S:g} ms' in LIMITS
+    assert f'each step, {1e3 * PERIOD_S:g} ms' in limit_table()

@@ -352,11 +352,11 @@ class Pacer:
 
     def __init__(self, period_s: float, clock: Callable[[], int]) -> None:
         self._period_ns = round(period_s * 1e9)
-        self.clock = clock
+        self._clock = clock
         self._due_ns = clock()
 
     def __call__(self) -> None:
         """Sleep."""
-        now_ns = self.clock()
+        now_ns = self._clock()
         self._due_ns = max(self._due_ns + self._period_ns, now_ns)
         time.sleep((self._due_ns - now_ns) * 1e-9)

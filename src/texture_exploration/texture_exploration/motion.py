@@ -257,27 +257,31 @@ def state_table() -> str:
 # All limits, once, with their defaults: name, quantity, value, who checks, how fast, what follows; docs/motion.md shows
 # them.
 
-_l, _t, _c = SafetyLimits(), TouchParams(), CommandLimits()
-_wall_n, _timeouts = WALL_SHARE * _l.force_limit_n, (_l.contact_timeout_s, _l.slide_overtime_s, _l.lift_timeout_s)
-LIMITS = f"""\
+
+def limit_table() -> str:
+    """Return the limits as rows of a table."""
+    limits, touch, commands = SafetyLimits(), TouchParams(), CommandLimits()
+    wall_n = WALL_SHARE * limits.force_limit_n
+    timeouts_s = limits.approach_timeout_s, limits.contact_timeout_s, limits.slide_overtime_s, limits.lift_timeout_s
+    return f"""\
 | `MOST_FORCE_N, MOST_M` | number of a sample | finite, {MOST_FORCE_N / 1e3:g} kN, {MOST_M:g} m | arm and Exploration | at once | lift |
-| `force_limit_n` | force in any direction | {_l.force_limit_n:g} N | ForceGuard | each step, 10 ms | way back, lift |
-| `WALL_SHARE` | force at a wall, foreseen | {WALL_SHARE:g} × force_limit_n, {_wall_n:g} N | Exploration | before it moves | refused |
-| `friction_limit` | force along the surface | {_l.friction_limit:g} × normal + {_l.tangential_floor_n:g} N | ForceGuard | each step, 10 ms | way back, lift |
-| `x_low_m to z_high_m` | place | ±{_l.x_high_m:g} m; {_l.z_low_m:g} to {_l.z_high_m:g} m | Exploration | each step, 10 ms | lift |
-| `surface_tolerance_m` | height of the contact | {1e3 * _l.surface_tolerance_m:g} mm | Exploration | each step, 10 ms | lift |
-| `state_timeout_s` | age of the state | {_l.state_timeout_s:g} s | Exploration | each step, 10 ms | stop |
+| `force_limit_n` | force in any direction | {limits.force_limit_n:g} N | ForceGuard | each step, 10 ms | way back, lift |
+| `WALL_SHARE` | force at a wall, foreseen | {WALL_SHARE:g} × force_limit_n, {wall_n:g} N | Exploration | before it moves | refused |
+| `friction_limit` | force along the surface | {limits.friction_limit:g} × normal + {limits.tangential_floor_n:g} N | ForceGuard | each step, 10 ms | way back, lift |
+| `x_low_m to z_high_m` | place | ±{limits.x_high_m:g} m; {limits.z_low_m:g} to {limits.z_high_m:g} m | Exploration | each step, 10 ms | lift |
+| `surface_tolerance_m` | height of the contact | {1e3 * limits.surface_tolerance_m:g} mm | Exploration | each step, 10 ms | lift |
+| `state_timeout_s` | age of the state | {limits.state_timeout_s:g} s | Exploration | each step, 10 ms | stop |
 | `signal_timeout_s` | silence of the sensor | {SignalWatchParams().signal_timeout_s:g} s | SignalWatch | each step, 10 ms | lift |
-| `frozen_force_s` | force that repeats | {_l.frozen_force_s:g} s | ForceWatch | each step, 10 ms | lift |
-| `force_drift_fraction` | drift in free air | {100 * _l.force_drift_fraction:g} % | ForceWatch | after the lift | no success |
+| `frozen_force_s` | force that repeats | {limits.frozen_force_s:g} s | ForceWatch | each step, 10 ms | lift |
+| `force_drift_fraction` | drift in free air | {100 * limits.force_drift_fraction:g} % | ForceWatch | after the lift | no success |
 | `OVERSHOOT` | force before the slide | {100 * OVERSHOOT:g} % above the wanted | OvershootWatch | 3 steps | lift |
 | `HARD, LATE_S` | force after the first touch | {HARD:g} impacts; {1e3 * LATE_S:g} ms | ForceLoop | delay + {LATE_S + 2 * HALF_S:g} s | lift |
-| `peak_force_fraction` | force in the slide | {100 * _t.peak_force_fraction:g} % above the wanted | SlideWatch | 3 steps | no window |
-| `peak_speed_fraction` | speed in the slide | {100 * _t.peak_speed_fraction:g} % above the wanted | SlideWatch | 50 ms | no window |
-| `lost_contact_s` | time without contact | {_t.lost_contact_s:g} s | ContactWatch | each step, 10 ms | lift |
-| `stall_s` | way by commanded way | {100 * _t.stall_speed_fraction:g} % in {_t.stall_s:g} s | StallWatch | {_t.stall_s:g} s | lift |
+| `peak_force_fraction` | force in the slide | {100 * touch.peak_force_fraction:g} % above the wanted | SlideWatch | 3 steps | no window |
+| `peak_speed_fraction` | speed in the slide | {100 * touch.peak_speed_fraction:g} % above the wanted | SlideWatch | 50 ms | no window |
+| `lost_contact_s` | time without contact | {touch.lost_contact_s:g} s | ContactWatch | each step, 10 ms | lift |
+| `stall_s` | way by commanded way | {100 * touch.stall_speed_fraction:g} % in {touch.stall_s:g} s | StallWatch | {touch.stall_s:g} s | lift |
 | `MOST_FORCE_SHARE` | change of the force in a rise | {100 * MOST_FORCE_SHARE:g} % of force_limit_n | Rise | each step, 10 ms | go back |
-| `approach_travel_m` | way down in search | {1e3 * _t.approach_travel_m:g} mm | ApproachStage | each step, 10 ms | lift |
-| `approach_timeout_s, …` | time of a stage | {', '.join(f'{one:g}' for one in (_l.approach_timeout_s, *_timeouts))} s | Stage | each step, 10 ms | lift |
-| `command_speed_m_s, …` | a single command | {_c.command_speed_m_s:g} m/s, {_c.command_normal_m_s:g} m/s, {_c.command_force_n:g} N | arm | at once | refused, stop |
+| `approach_travel_m` | way down in search | {1e3 * touch.approach_travel_m:g} mm | ApproachStage | each step, 10 ms | lift |
+| `approach_timeout_s, …` | time of a stage | {', '.join(f'{one:g}' for one in timeouts_s)} s | Stage | each step, 10 ms | lift |
+| `command_speed_m_s, …` | a single command | {commands.command_speed_m_s:g} m/s, {commands.command_normal_m_s:g} m/s, {commands.command_force_n:g} N | arm | at once | refused, stop |
 """.replace('-', '−')  # noqa: E501  # a row is a line
