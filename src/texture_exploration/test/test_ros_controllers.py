@@ -13,6 +13,7 @@ from twist_robot import LIMITS, NO_NOISE, PERIOD_NS, Robot
 
 from texture_core.errors import CommandRefused, DeviceError, ExplorationError, InvalidParameter, MotionRefused
 from texture_core.types import ExplorationRequest, rotation_matrix
+from texture_exploration import explorer as explorer_module
 from texture_exploration.arms.arm import ArmCommand
 from texture_exploration.arms.tool_state import FollowWatch
 from texture_exploration.arms.tool_state import RosControllersParams as Params
@@ -617,6 +618,29 @@ def test_an_arm_that_lost_its_zero_between_two_explorations_lifts_first(noisy):
     noisy.pass_time(0.5)
     assert (noisy.arm.zeroed, explorer.fault()) == (False, '')
     outcome = explorer._prepare('one', PRESS).run(lambda: noisy.pass_time(0.01))
+    assert outcome.success, outcome.message
+
+
+def test_a_heavy_tool_whose_zero_is_lost_after_a_success_is_not_taken_for_pressed(monkeypatch):
+    heavy = TwistControllerParams(jitter_s=0.0, force_noise_n=0.02, tool_mass_kg=0.8)  # 7.8 N before it is zeroed
+    robot = Robot(heavy, touching_n=0.12)
+    monkeypatch.setattr(explorer_module, 'Pacer', lambda *_: lambda: robot.pass_time(0.01))
+    explorer = robot.explorer()
+    explorer.connect()
+    robot.pass_time(0.25)
+
+    def explored():
+        exploration = explorer._prepare('one', PRESS)
+        explorer._run(exploration)
+        return exploration.outcome
+
+    assert explored().success
+    robot.pose_comes = False
+    robot.pass_time(0.2)
+    robot.pose_comes = True
+    robot.pass_time(0.5)
+    assert not robot.arm.zeroed
+    outcome = explored()
     assert outcome.success, outcome.message
 
 
