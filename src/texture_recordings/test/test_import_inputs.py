@@ -136,6 +136,9 @@ CLOCKS: dict[str, tuple[Write, dict, Truth]] = {
     'times of 32 bits': (npz(t=(1e5 + T).astype(np.float32), x=X), ANY, 'time counts in steps of 0.0078125 s'),
     'too few digits': (csv([f'{1.7e9 + t:.6e}' for t in T], X), {}, 'the times of .signal. do not grow'),
     'newest first': (csv(T[::-1], X[::-1]), {}, 'the times of .signal. do not grow'),
+    'a time twice behind rows in disorder': (
+        csv(np.where(np.arange(N) == 300, T[299], T)[np.r_[:10, 11, 10, 12:N]], X), {}, 'row 301, .*1 times come twice',
+    ),
     'logs overlap by few rows': (csv(np.r_[T[:300], T[297:]], np.r_[X[:300], X[297:]]), {}, CORK),
     'logs overlap': (
         csv(np.r_[T[:300], T[200:]], np.r_[X[:300], X[200:]]), {'slides': {'by': 'pause'}},
@@ -286,6 +289,7 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
     ),
     'units below the header': (text('n,x\nsample,1\n' + lines(range(N), X)), RATE, CORK),
     'a mean below the rows': (text('n,x\n' + lines(range(N), X) + 'Mean,0.3\n'), RATE, CORK),
+    'a delimiter at the end of each row': (text('t,x\n' + lines(T, [f'{x:.6f},' for x in X])), {}, CORK),
     'a last row that was cut': (text(('t,x\n' + lines(T, [f'{x:.6f}' for x in X]))[:-4]), {}, [('cork', X[:-1])]),
     '#N/A in the first column': (
         csv(['#N/A' if np.isnan(x) else x for x in MISSING], Y, names='x,y'), RATE, [('cork', MISSING)],

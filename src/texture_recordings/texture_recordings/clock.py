@@ -121,7 +121,7 @@ def on_grid(
         rows, index = _burst_places(times, samples, rate_hz, burst_s, stated=stated)
         left_out['rows of incomplete bursts'] = len(times) - len(rows)
     else:
-        index = _places(times[rows], rate_hz, out, stated=stated)
+        index = _places(times[rows], rows, rate_hz, out, stated=stated)
     # Of a row or two behind a gap at an end nobody knows whether the gap or their time is wrong.
     apart = np.flatnonzero(np.diff(index) > 1)
     low = max((place + 1 for place in apart[apart < 2]), default=0)
@@ -153,13 +153,13 @@ def on_grid(
     return rows, index - index[0], Counter(counts)
 
 
-def _places(times: Array, rate_hz: float, out: int, *, stated: bool) -> AnyArray:
-    """Return the place of each row on the grid, (n,), from which `out` rows were left out."""
+def _places(times: Array, rows: AnyArray, rate_hz: float, out: int, *, stated: bool) -> AnyArray:
+    """Return the place of each of these rows on the grid, (n,), from which `out` others were left out."""
     steps = np.diff(times) * rate_hz
     unlike = np.flatnonzero(steps < SAME_TIME)
     if len(unlike):
         raise ClockFault(
-            int(unlike[0]), f'{len(unlike)} times come twice with other values: of a coarse clock, or of several '
+            int(rows[unlike[0]]), f'{len(unlike)} times come twice with other values: of a coarse clock, or of several '
             'sensors; choose rows (`rows: {column: value}`), or give `rate_hz` in place of the column of time',
         )  # fmt: skip
     # A late row is followed by a short step, an early one comes after one, a loss is not.
@@ -179,7 +179,7 @@ def _places(times: Array, rate_hz: float, out: int, *, stated: bool) -> AnyArray
     for row in np.flatnonzero(missing).tolist():
         if abs(np.median(lag[row + 1 : row + 6]) - np.median(lag[max(0, row - 4) : row + 1])) > 0.5:
             raise ClockFault(
-                row + 1, f'a gap of {steps[row]:.3g} samples at {rate_hz:g} Hz contradicts the times '
+                int(rows[row + 1]), f'a gap of {steps[row]:.3g} samples at {rate_hz:g} Hz contradicts the times '
                 f'around it, so lost samples cannot be told from late rows; by rows and duration the rate is '
                 f'{len(times) / max(times[-1] - times[0], 1e-9):.4g} Hz; {WITHOUT_TIME}',
             )  # fmt: skip
@@ -213,7 +213,7 @@ def _burst_places(
             f'duration the rate is {len(times) / max(times[-1] - times[0], 1e-9):.4g} Hz; {WITHOUT_TIME}',
         )  # fmt: skip
     whole = counts == size
-    index = _places(times[starts[whole]], rate_hz / size, 0, stated=stated)
+    index = _places(times[starts[whole]], starts[whole], rate_hz / size, 0, stated=stated)
     rows = np.add.outer(starts[whole], np.arange(size)).ravel()
     return rows, np.add.outer(size * index, np.arange(size)).ravel()
 

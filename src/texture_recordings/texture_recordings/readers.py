@@ -176,6 +176,7 @@ def _csv_columns(  # noqa: PLR0917 – bound one after the other
         while block := list(islice(lines, BLOCK_ROWS)):
             take(len(block) * (len(numbers) + 2 * len(texts)))
             cells = [_cells(line, form.delimiter) for _, line in block]
+            cells = [row[:-1] if len(row) == len(names) + 1 and not row[-1] else row for row in cells]
             whole = np.array([len(row) == len(names) for row in cells])
             whole[-1] &= block[-1][1].endswith('\n')  # or the row may have been cut off
             rows = [row if good else [''] * len(names) for row, good in zip(cells, whole.tolist(), strict=True)]
@@ -212,11 +213,11 @@ def _csv_columns(  # noqa: PLR0917 – bound one after the other
                         f"'{place}', row {block[row][0]}: the names of the columns come again, "
                         f'{", ".join(cells[row][:5])}, so another recording may begin there; split the file there'
                     )
-            told = {name: [_text(cell) for cell in columns[name]] for name in texts}
+            cleaned = {name: [_text(cell) for cell in columns[name]] for name in texts}
             blocks.append({
                 'line': np.array([number for number, _ in block]), 'junk': junk, 'odd': odd, 'empty': empty,
                 **{f'number {name}': parsed[name] for name in numbers},
-                **{f'text {name}': np.array(cells, dtype=str) for name, cells in told.items()},
+                **{f'text {name}': np.array(cells, dtype=str) for name, cells in cleaned.items()},
             })  # fmt: skip
     if not blocks:
         raise InvalidData(f"'{place}' has no rows below the names of its columns; choose files with samples")
@@ -278,7 +279,7 @@ def _lines(opened: Any, form: FileFormat) -> Iterator[Line]:
 
 
 def _cells(line: str, delimiter: str) -> list[str]:
-    """Return the cells of a line without blanks around them and an empty one at the end; none of wrong quotes.
+    """Return the cells of a line without blanks around them; none of wrong quotes.
 
     Each line by itself: a quote that is never closed spoils one row and not the rest of the file.
     """

@@ -399,10 +399,10 @@ class FrameSlides:
             found = marked | junk if junk is not None and length == len(junk) else marked
             count = int(found.sum())
             self._report.rows += length
-            told = dict(self._columns.reasons)
-            if count and not told:
-                told[self._line(int(found.argmax()))] = 'no finite number'
-            reasons = [f'row {line}, {reason}' for line, reason in told.items()]
+            by_line = dict(self._columns.reasons)
+            if count and not by_line:
+                by_line[self._line(int(found.argmax()))] = 'no finite number'
+            reasons = [f'row {line}, {reason}' for line, reason in by_line.items()]
             if not length or count > MAX_LEFT_OUT * length:
                 raise InvalidData(
                     f"'{self._place}' has {count} malformed rows of {length}, first "
