@@ -1,14 +1,18 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The sub-commands of `texture` that show catalogues, and a bag or a model."""
+"""The sub-commands of `texture` that show catalogues, a bag or a model, and this machine."""
 
 from __future__ import annotations
 
 import argparse
+import grp
 import inspect
+import os
+import platform
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import ModuleType
 
@@ -161,5 +165,69 @@ def _bag_rows(bag: Path, namespace: str | None) -> Iterator[Row]:
         yield f'  {surface or "(no surface)"}', ', '.join(f'{count} {phase}' for phase, count in phases.items())
 
 
+# --------------------
+# What of this machine matters, on one screen.
+
+PACKAGES = ('texture_core', 'rclpy', 'numpy', 'scipy', 'scikit-learn', 'rosbags', 'ur-rtde', 'miniaudio', 'aiohttp')
+GROUPS = {'dialout': 'serial devices', 'audio': 'sound cards', 'realtime': 'real-time priority'}
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return 'not installed'
+
+
+def _ports() -> str:
+    from serial.tools import list_ports
+
+    found = [f'{port.device} ({port.description})' for port in list_ports.comports()]
+    return ', '.join(found) or 'none; plug the sensor in, and check whether its kernel driver is loaded'
+
+
+def _groups() -> str:
+    mine = set(os.getgroups())
+    members = {one.gr_name for one in grp.getgrall() if one.gr_gid in mine}
+    return ', '.join(
+        f'{name} {"yes" if name in members or not os.geteuid() else "no"} ({use})' for name, use in GROUPS.items()
+    )
+
+
+def _ros() -> str:
+    distribution = os.environ.get('ROS_DISTRO', '')
+    sourced = [place for place in os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep) if '/opt/ros/' in place]
+    where = f'sourced from {sourced[0]}' if sourced else 'from the Python packages of the set-up, none is sourced'
+    return f'{distribution or "no distribution"}, {where}'
+
+
+def _dds() -> str:
+    try:
+        from texture_bringup.operator import middleware
+
+        name = middleware()
+    except Exception as error:  # this command reports any error of a broken installation
+        name = f'cannot be loaded: {error}'
+    domain, reach = os.environ.get('ROS_DOMAIN_ID', '0'), os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE', 'SUBNET')
+    return f'{name}, domain {domain}, discovery range {reach}'
+
+
+CHECKS: Mapping[str, Callable[[], str]] = {
+    'system': lambda: f'{platform.platform()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}',
+    'Python': platform.python_version,
+    'ROS': _ros,
+    'DDS': _dds,
+    'serial ports': _ports,
+    'groups': _groups,
+    'versions': lambda: ', '.join(f'{name} {_version(name)}' for name in PACKAGES),
+}
+
+
+def _doctor(_options: argparse.Namespace) -> int:
+    print(table((name, check()) for name, check in CHECKS.items()))
+    return 0
+
+
 list_ = Command('list what can be chosen: sensors, motions, arms, recipes, surfaces', _configure_list, _list)
 info = Command('show what a bag or a model holds', _configure_info, _info)
+doctor = Command('show what matters of this machine: ports, groups, ROS, versions', lambda _parser: None, _doctor)
