@@ -102,7 +102,7 @@ def client(graph):
 
 
 @pytest.mark.realtime
-def test_the_client_explores_cancels_stops_and_is_told_what_is_wrong(graph, client):
+def test_the_client_explores_cancels_and_stops_and_each_fault_has_its_code(graph, client):
     with World():
         aborted = GoalStatus.STATUS_ABORTED
         cases = {

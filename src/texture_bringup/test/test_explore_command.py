@@ -89,7 +89,7 @@ def test_slides_in_several_directions_end_with_the_first_that_fails(monkeypatch,
     assert '2 of 4 slides were made\n' in capsys.readouterr().err
 
 
-def test_identify_makes_the_slide_that_tells_textures_apart_until_one_is_decided(monkeypatch, capsys):
+def test_identify_makes_the_slide_that_distinguishes_textures_until_one_is_decided(monkeypatch, capsys):
     apart, alike = (SlideMotion('linear_slide', angle, 0.1, 2.0, 0.5) for angle in (0.0, math.pi / 4))
     slides = [
         (motion, texture, [10.0 * (motion is apart and texture == 'ridges_x') + wobble])

@@ -105,7 +105,7 @@ def test_an_unknown_condition_or_one_that_slides_do_not_tell_is_refused() -> Non
         ('speed', [0.02, 0.02, 0.04, 0.04, 0.04, 0.02]),  # within five per cent they are one
     ],
 )
-def test_conditions_are_told_of_each_slide(condition: str, expected: list) -> None:
+def test_each_slide_has_its_conditions(condition: str, expected: list) -> None:
     assert from_arrays(sensor='finger', session='monday').condition(condition).tolist() == expected
 
 

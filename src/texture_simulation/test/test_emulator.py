@@ -148,12 +148,12 @@ def test_the_fingers_of_a_board_sense_other_places_of_one_surface(tmp_path: Path
     live = LIVE_SENSORS['biotac_hand'](scene, surface, tmp_path / 'biotac', rng)
     slide = straight((0.0, 0.0, FORCE_N), (0.1, 0.0, FORCE_N), 4400)
 
-    def felt() -> np.ndarray:
+    def measured() -> np.ndarray:
         return np.stack([finger.measure(slide)['signal'][1100:, 0] for finger in live.fingers], axis=-1)
 
-    pac = felt()
+    pac = measured()
     rough = pac.std(axis=0)
     np.testing.assert_allclose(rough, rough.mean(), rtol=0.3)
     assert all(np.abs(pac[:, 0] - pac[:, other]).max() > rough[0] for other in (1, 2))
     live.surface = scene.surface('glass')
-    assert (felt().std(axis=0) < 0.3 * rough).all()
+    assert (measured().std(axis=0) < 0.3 * rough).all()

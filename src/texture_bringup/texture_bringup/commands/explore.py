@@ -349,7 +349,7 @@ def collect_surface(
                 return error.error, str(error)
             return explored.error, explored.message
 
-        end = collect_places(plan, params, explore, partial(_evaluate_bag, bag, surface), _tell)
+        end = collect_places(plan, params, explore, partial(_evaluate_bag, bag, surface), _print_progress)
     # Where the recorder has ended, the bag there may be another one.
     if end.slides or end.error is CollectionError.NOT_RECORDED:
         return end, bag
@@ -359,7 +359,7 @@ def collect_surface(
     return replace(end, message=f'{end.message}; no slide was made, so no bag is kept'), None
 
 
-def _tell(sentence: str, slides: int) -> None:
+def _print_progress(sentence: str, slides: int) -> None:
     print(f'{slides} slides: {sentence}', flush=True)
 
 

@@ -144,7 +144,7 @@ class Classifier(EstimatorNode):
         super().__init__('classifier', **kwargs)
         self._revision = 0
         self._model_infos = self.create_publisher(msg.ModelInfo, 'model_info', quality_of_service('model_info'))
-        self._tell_model()
+        self._publish_model()
         self.create_service(srv.AddTexture, '~/add_texture', self._on_add)
         self.create_service(Trigger, '~/remove_last_added', self._on_remove_last)
         self.create_service(srv.RemoveTexture, '~/remove_texture', self._on_remove)
@@ -161,9 +161,9 @@ class Classifier(EstimatorNode):
 
     def _change(self, params: EstimatorParams) -> None:
         super()._change(params)
-        self._tell_model()
+        self._publish_model()
 
-    def _tell_model(self) -> None:
+    def _publish_model(self) -> None:
         """Publish the labels of the model, which estimates do not repeat."""
         self._revision += 1
         model, now_ns = self._evidence.model, self.get_clock().now().nanoseconds
@@ -229,7 +229,7 @@ class Classifier(EstimatorNode):
         """Classify with the updated model."""
         model = self._require_incremental().model
         self._evidence = EvidenceAccumulator(model)
-        self._tell_model()
+        self._publish_model()
         self.get_logger().info(_known(model))
         return model
 
