@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
+# SPDX-License-Identifier: Apache-2.0
 # The set-up is tools/workspace.py; every target below calls it first, and a finished set-up is recognised in a second.
 # `make setup PYTHON=python3.12` makes the environment of that Python; later calls keep it, whatever python3 is.
 PYTHON ?= python3
