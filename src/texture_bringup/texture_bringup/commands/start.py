@@ -33,17 +33,13 @@ def _configure_launch(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('file', help="path of a launch file, or the name of one of the suite's, such as emulator")
     parser.add_argument('arguments', nargs='*', default=[], metavar='NAME:=VALUE', help='arguments of the launch file')
     parser.add_argument('--parent', type=int, help=argparse.SUPPRESS)
-    parser.add_argument(
-        '--together',
-        action='store_true',
-        help='stop all nodes when one dies; otherwise it is started again if it may be',
-    )
     parser.add_argument('--show-args', action='store_true', help='show the arguments of the launch file')
 
 
 def _launch(options: argparse.Namespace) -> int:
     """Run the nodes until they end or Ctrl-C; return 2 if a needed one was started wrongly, 1 if one died, else 0."""
-    if options.parent is not None:
+    child = options.parent is not None  # of a program that needs all nodes: it and they end together
+    if child:
         end_with(options.parent, signal.SIGINT)
     path = find_launch_file(options.file)
     if options.show_args:
@@ -52,7 +48,7 @@ def _launch(options: argparse.Namespace) -> int:
     given = given_arguments(options.arguments)
     nodes = read(path, given, os.environ)
     refuse_wrong(nodes, set(given.values()))
-    return Supervisor(nodes, _say, together=options.together).run()
+    return Supervisor(nodes, _say, together=child).run()
 
 
 # What a node would refuse, by its program: the parameters of which all are looked at if one of them was given.
