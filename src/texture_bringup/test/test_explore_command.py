@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from texture_bringup.command import main
-from texture_bringup.commands.explore import explored, texture_text
+from texture_bringup.commands.explore import explored
+from texture_bringup.feed import texture_text
 from texture_bringup.operator import ExplorationResult
 from texture_core.cli import run_program
 from texture_core.errors import ExplorationError, MotionAborted

@@ -23,6 +23,7 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
+from texture_bringup.feed import roughness_text, texture_text
 from texture_bringup.operator import ExplorationResult, Operator, Progress
 from texture_core.cli import USER_ERROR, Command, add_namespace, add_parameters, parameters_from
 from texture_core.config import find
@@ -34,12 +35,7 @@ from texture_core.errors import (
     MotionAborted,
     MotionRefused,
 )
-from texture_core.types import (
-    ExplorationRequest,
-    ExplorationState,
-    RoughnessEstimate,
-    TextureEstimate,
-)
+from texture_core.types import ExplorationRequest, ExplorationState, TextureEstimate
 from texture_estimation.model import load_model
 from texture_estimation.next_motion import slide_values
 from texture_evaluation.check import check_finger, store_reference
@@ -69,7 +65,6 @@ NUMBERS = (
     ('turns', 'turns', 'N', 'turns, if the motion has some'),
     ('duration', 'duration_s', 'S', 'duration of an in-hand slide'),
 )
-UNLIKE = 'it resembles no trained texture'
 BAR = 24
 TIMEOUT_S = 300.0
 EXPLORER_S, SOON_S = 5.0, 1.0  # within which an explorer that runs is discovered, at most and usually
@@ -229,29 +224,7 @@ def show_progress(state: ExplorationState, texture: TextureEstimate) -> None:
         return
     fraction = state.progress if state.progress >= 0 else 0.0
     bar = '█' * round(BAR * fraction)
-    print(f'\r{state.phase.value:<9}|{bar:<{BAR}}| {progress_text(texture):<60}', end='', file=sys.stderr, flush=True)
-
-
-def texture_text(estimate: TextureEstimate) -> str:
-    """Return a texture estimate as text, with the reason if it is rejected."""
-    if not estimate.label or estimate.accepted:
-        return progress_text(estimate)
-    return f'{progress_text(estimate)}: {estimate.message or UNLIKE}'
-
-
-def progress_text(estimate: TextureEstimate) -> str:
-    """Return a texture estimate as text that fits the progress line."""
-    if not estimate.label:
-        return estimate.message or 'none yet'
-    nearest = f'{estimate.label}, confidence {estimate.confidence:.2f} after {estimate.evidence_s:.1f} s'
-    return nearest if estimate.accepted else f'unknown (nearest: {nearest})'
-
-
-def roughness_text(estimate: RoughnessEstimate) -> str:
-    """Return a roughness estimate as text."""
-    if not estimate.valid:
-        return estimate.message
-    return f'{estimate.grade:.1f} ± {estimate.grade_std:.1f} on the scale from 1 (smooth) to 5 (rough)'
+    print(f'\r{state.phase.value:<9}|{bar:<{BAR}}| {texture_text(texture):<60.60}', end='', file=sys.stderr, flush=True)
 
 
 # --------------------
