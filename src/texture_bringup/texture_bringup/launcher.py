@@ -19,7 +19,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, TypeVar
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
@@ -40,28 +40,22 @@ from texture_core.config import (
 from texture_core.errors import InvalidLaunch, LaunchFailed, TextureError
 
 # --------------------
-# A launcher as a child process of another program, which watches and ends it.
+# A sub-command as a child process of another program, which watches and ends it.
 
-STOP_DEADLINE_S = 15.0  # the launcher itself kills after 8 s
+ChildT = TypeVar('ChildT', bound='Child')
+STOP_DEADLINE_S = 30.0  # a launcher kills its nodes after 8 s, a recorder may be behind
 
 
-class ChildLauncher:
-    """Run `texture launch FILE …` as a child process, whose nodes end together; use it in a `with` block."""
+class Child:
+    """Run a sub-command of `texture`; use it in a `with` block."""
 
-    def __init__(
-        self,
-        file: str,
-        arguments: Mapping[str, object],
-        environment: Mapping[str, str],
-        log: Path,
-    ) -> None:
+    def __init__(self, arguments: Sequence[str], environment: Mapping[str, str], log: Path) -> None:
         self.log = log
-        launch = [sys.executable, '-m', 'texture_bringup.command', 'launch', '--parent', str(os.getpid())]
-        self._command = [*launch, file, *(f'{name}:={value}' for name, value in arguments.items())]
+        self._command = [sys.executable, '-m', 'texture_bringup.command', *arguments]
         self._environment = environment
         self._process: subprocess.Popen[bytes] | None = None
 
-    def __enter__(self) -> ChildLauncher:
+    def __enter__(self: ChildT) -> ChildT:
         with self.log.open('wb') as log:
             self._process = subprocess.Popen(
                 self._command,
@@ -69,29 +63,44 @@ class ChildLauncher:
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=log,
-                start_new_session=True,  # Ctrl-C reaches this program only, which then stops the nodes in order
+                start_new_session=True,  # Ctrl-C reaches this program only, which then stops the child in order
             )
         return self
 
     def __exit__(self, *_: object) -> None:
         self.stop()
 
-    def check(self) -> None:
-        """Raise LaunchFailed, with the last line of the log, which names the cause, if the nodes have ended."""
-        if self._process is not None and self._process.poll() is not None:
-            last = self.log.read_text(errors='replace').rstrip().rpartition('\n')[2].removeprefix('[launch] ')
-            raise LaunchFailed(f'{last or "the launcher ended"}; the output of all nodes is in {self.log}')
+    @property
+    def end(self) -> str:
+        """The last line of the log, which names the cause, if the child has ended; else ''."""
+        if self._process is None or self._process.poll() is None:
+            return ''
+        last = self.log.read_text(errors='replace').rstrip().rpartition('\n')[2].removeprefix('[launch] ')
+        return last or 'it ended'
 
     def stop(self) -> None:
-        """Stop the nodes and wait until none is left."""
+        """Stop the child and wait until nothing of it is left."""
         if self._process is None:
             return
         self._process.send_signal(signal.SIGINT)
         try:
             self._process.wait(STOP_DEADLINE_S)
         except subprocess.TimeoutExpired:
-            self._process.kill()  # its nodes end with it
+            self._process.kill()  # nodes of a launcher end with it
             self._process.wait()
+
+
+class ChildLauncher(Child):
+    """Run `texture launch FILE …`, whose nodes end together."""
+
+    def __init__(self, file: str, arguments: Mapping[str, object], environment: Mapping[str, str], log: Path) -> None:
+        given = (f'{name}:={value}' for name, value in arguments.items())
+        super().__init__(['launch', '--parent', str(os.getpid()), file, *given], environment, log)
+
+    def check(self) -> None:
+        """Raise LaunchFailed if the nodes have ended."""
+        if self.end:
+            raise LaunchFailed(f'{self.end}; the output of all nodes is in {self.log}')
 
 
 # --------------------

@@ -8,9 +8,8 @@ import argparse
 import json
 import logging
 import math
+import os
 import shutil
-import signal
-import subprocess
 import sys
 import tempfile
 import time
@@ -24,6 +23,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 
 from texture_bringup.feed import roughness_text, texture_text
+from texture_bringup.launcher import Child
 from texture_bringup.operator import ExplorationResult, Operator, Progress
 from texture_core.cli import USER_ERROR, Command, add_namespace, add_parameters, parameters_from
 from texture_core.config import find
@@ -286,7 +286,6 @@ def _identify(options: argparse.Namespace) -> int:
 # Collect slides of a surface.
 
 RECIPE = 'default'  # whose features distinguish the places
-RECORDER_S = 30.0  # to start, and to complete the bag
 FLUSHED_S = 20.0  # within which what was recorded can be read: a recorder may be behind
 RECORDED = ('signal', 'exploration')
 PATCH = ('patch_x_low_m', 'patch_x_high_m', 'patch_y_low_m', 'patch_y_high_m')
@@ -357,30 +356,16 @@ def recorder(operator: Operator, bag: Path, namespace: str) -> Iterator[Callable
     """Record a bag in a separate process; the function raises InvalidData, with its last message, if that ended."""
     operator.wait_for_listeners(RECORDED, 1, lambda: None)  # the feature extractor; by then all others are found
     wanted = {topic: operator.listeners(topic) + 1 for topic in RECORDED}
-    command = [sys.executable, '-m', 'texture_bringup.command', 'record', str(bag), '--namespace', namespace]
-    with tempfile.TemporaryFile('w+') as output:
-        process = subprocess.Popen(command, stdout=output, stderr=output, start_new_session=True)
-
-        def last_message() -> str:
-            output.seek(0)
-            return output.read().strip().rpartition('\n')[2]
+    arguments = ['record', str(bag), '--namespace', namespace]
+    with tempfile.TemporaryDirectory() as log, Child(arguments, os.environ, Path(log) / 'record.log') as child:
 
         def check() -> None:
-            if process.poll() is not None:
-                raise InvalidData(f'the recorder ended: {last_message()}')
+            if child.end:
+                raise InvalidData(f'the recorder ended: {child.end}')
 
-        try:
-            for topic, number in wanted.items():
-                operator.wait_for_listeners((topic,), number, check)
-            yield check
-        finally:
-            if process.poll() is None:
-                process.send_signal(signal.SIGINT)
-            try:
-                process.wait(RECORDER_S)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+        for topic, number in wanted.items():
+            operator.wait_for_listeners((topic,), number, check)
+        yield check
 
 
 # Parameters whose options are shorter; both numbers of a range follow one option.

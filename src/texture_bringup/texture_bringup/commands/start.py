@@ -145,14 +145,12 @@ def _configure_demo(parser: argparse.ArgumentParser) -> None:
 
 def _demo(options: argparse.Namespace) -> int:
     """Run the demonstration; return 1 if an answer was not as expected."""
-    from texture_bringup.demo import ProgressLog, demonstrate
+    from texture_bringup.demo import demonstrate, line
     from texture_estimation.recipe import load_recipe
 
     load_recipe(options.recipe)  # refused before the nodes start
-    progress = ProgressLog()
-    progress.line('Everything physical in this demonstration is simulated: surfaces, arm and sensor.')
-    right = demonstrate(options.out, options.recipe, options.seed, progress, dashboard=options.dashboard)
-    return 0 if right else 1
+    line('Everything physical in this demonstration is simulated: surfaces, arm and sensor.')
+    return 0 if demonstrate(options.out, options.recipe, options.seed, dashboard=options.dashboard) else 1
 
 
 launch = Command('start the nodes of a launch file', _configure_launch, _launch)
