@@ -251,12 +251,7 @@ def _explore(operator: Operator) -> list[Slide]:
     return slides
 
 
-def slide_over(
-    operator: Operator,
-    request: ExplorationRequest,
-    title: str,
-    expected: frozenset[Rejection],
-) -> Slide:
+def slide_over(operator: Operator, request: ExplorationRequest, title: str, expected: frozenset[Rejection]) -> Slide:
     """Put the surface of a request under the finger and slide.
 
     A slide that is aborted, or rejected over a trained surface, is made again, twice at most: by its calibration the

@@ -39,16 +39,7 @@ from texture_core.errors import (
     MotionAborted,
     TextureError,
 )
-from texture_core.ros import (
-    FEATURE_QOS,
-    LEVELS,
-    SENSOR_QOS,
-    STATE_QOS,
-    from_msg,
-    has_ended,
-    quality_of_service,
-    to_msg,
-)
+from texture_core.ros import FEATURE_QOS, LEVELS, SENSOR_QOS, STATE_QOS, from_msg, has_ended, quality_of_service, to_msg
 from texture_core.types import ExplorationRequest, ExplorationState, FeatureVector, RoughnessEstimate, TextureEstimate
 
 
@@ -425,11 +416,7 @@ class Operator:
         self._heard_s = time.monotonic()
 
     def _until(
-        self,
-        condition: Callable[[], bool],
-        deadline_s: float,
-        complaint: str,
-        error: type[TextureError] = LaunchFailed,
+        self, condition: Callable[[], bool], deadline_s: float, complaint: str, error: type[TextureError] = LaunchFailed
     ) -> None:
         deadline = time.monotonic() + deadline_s
         with task(f'waiting: {complaint}'):
