@@ -23,7 +23,6 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from scipy.io import wavfile
 
 from texture_bringup.launcher import all_arguments
 from texture_core import config as resources
@@ -41,14 +40,12 @@ from texture_estimation.roughness import (
     train_grades,
 )
 from texture_estimation.training import train
-from texture_evaluation.panel import read_ratings
 from texture_exploration.arms.hand import load_profile
 from texture_exploration.presets import load_preset
 from texture_features.feature_set import FeatureSet, LabelledFeatures
-from texture_recordings.bags import TYPES, BagWriter, decode, encode
+from texture_recordings.bags import BagWriter
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.mapping import load_mapping
-from texture_recordings.public_sets import import_biotac20
 from texture_simulation.scene import load_scene
 
 SEED = int(os.environ.get('FUZZ_SEED', '0'))
@@ -135,47 +132,11 @@ def make_bag(folder: Path) -> None:
             bag.write(topic, value, log_ns)
 
 
-def make_wav(folder: Path) -> None:
-    samples = np.random.default_rng(3).integers(-1000, 1000, (50, 2)).astype(np.int16)
-    wavfile.write(folder / 'good.wav', 1000, samples)
-
-
-def make_biotac(folder: Path) -> None:
-    rng = np.random.default_rng(5)
-    arrays = {
-        'frame_time': np.arange(600) / 100,
-        'frames': rng.integers(0, 99, (600, 44)).astype(np.int16),
-        'velocity': rng.normal(size=(500, 4)),
-        'wrench': rng.normal(size=(500, 7)),
-        'epoch': np.float64(1e9),
-    }
-    np.savez_compressed(folder / 'material01.npz', **{f'slide01/{name}': array for name, array in arrays.items()})
-
-
-def read_import(load: Callable[..., object]) -> Callable[[Path], object]:
-    def read_into_nothing(folder: Path) -> object:
-        shutil.rmtree(folder / 'out', ignore_errors=True)
-        return load(folder, folder / 'out')
-
-    return read_into_nothing
-
-
-def make_message(value: Any) -> Callable[[Path], None]:
-    return lambda folder: (folder / 'message').write_bytes(encode(value)) and None
-
-
-def make_ratings(folder: Path) -> None:
-    rows = [f'{rater},{texture},{1 + (rater + texture) % 5}' for rater in range(4) for texture in range(6)]
-    (folder / 'good.csv').write_text('\n'.join(['rater,texture,grade', *rows]) + '\n')
-
-
 def make_recording(ending: str) -> Callable[[Path], None]:
     samples = np.random.default_rng(2).normal(size=(50, 2))
 
     def make(folder: Path) -> None:
-        if ending == 'npy':
-            np.save(folder / 'good.npy', samples)
-        elif ending == 'npz':
+        if ending == 'npz':
             np.savez_compressed(folder / 'good.npz', samples=samples, rate_hz=1000.0, channels=['a', 'b'])
         else:
             np.savetxt(folder / 'good.csv', samples, delimiter=',', header='a,b', comments='')
@@ -185,13 +146,6 @@ def make_recording(ending: str) -> Callable[[Path], None]:
 
 def read_slides(folder: Path) -> object:
     return list(SlideDataset.from_bags([folder / 'bag']).windows(FeatureSet.load('default')))
-
-
-def read_message(kind: type) -> Callable[[Path], object]:
-    return lambda folder: decode((folder / 'message').read_bytes(), TYPES[kind])
-
-
-(_, STATE, _), (_, SIGNAL, _), *_ = messages()
 
 
 def text_file(package: str, file: str, load: Callable[[str], object]) -> Reader:
@@ -217,23 +171,17 @@ READERS = {
         make_roughness_model, lambda folder: load_roughness_model(folder / 'model'), (MODEL, CARD)
     ),
     'bag': Reader(make_bag, read_slides, ('bag/bag.mcap', 'bag/metadata.yaml')),
-    'signal': Reader(make_message(SIGNAL), read_message(TactileSignal), ('message',)),
-    'state': Reader(make_message(STATE), read_message(ExplorationState), ('message',)),
     'recipe': text_file('texture_estimation', 'config/recipes/vibration-and-taxels.yaml', load_recipe),
-    'roughness recipe': text_file('texture_estimation', 'config/roughness/roughness.yaml', load_roughness_recipe),
     'scene': text_file('texture_simulation', 'config/scenes/twelve_textures.yaml', load_scene),
     'hand profile': text_file('texture_exploration', 'config/hands/leap.yaml', load_profile),
     'preset': text_file('texture_papers', 'config/presets/ets-linear.yaml', load_preset),
     'settings': text_file('texture_drivers', 'config/sensors/daq.yaml', load_daq),
     'grades': text_file('texture_papers', 'config/grades/ets_roughness.csv', read_grades),
-    'ratings': Reader(make_ratings, lambda folder: read_ratings(folder / 'good.csv'), ('good.csv',)),
     'launch file': text_file(
         'texture_bringup', 'launch/emulator.launch.xml', lambda path: all_arguments(Path(path), {})
     ),
-    'recording wav': Reader(make_wav, lambda folder: load_recording(folder / 'good.wav'), ('good.wav',)),
-    'BioTac data set': Reader(make_biotac, read_import(import_biotac20), ('material01.npz',)),
     'mapping': text_file('texture_recordings', 'config/mappings/icub20.yaml', load_mapping),
-    **{f'recording {ending}': recording(ending) for ending in ('csv', 'npy', 'npz')},
+    **{f'recording {ending}': recording(ending) for ending in ('csv', 'npz')},
 }
 CASES = [(name, file) for name, reader in READERS.items() for file in reader.files]
 
@@ -271,12 +219,6 @@ def huge_number(content: bytes, rng: np.random.Generator) -> bytes:
     return content[:place] + number + content[place + len(number) :]
 
 
-def turned(content: bytes, rng: np.random.Generator) -> bytes:
-    """Return the bytes with a part of them moved elsewhere."""
-    first, second, third = np.sort(rng.integers(0, len(content), 3))
-    return content[:first] + content[second:third] + content[first:second] + content[third:]
-
-
 def novel(content: bytes, rng: np.random.Generator, ending: str) -> bytes:
     """Return the text with one value in it, at any depth, replaced by a strange one or left out."""
     dump = json.dumps if ending == 'json' else yaml.safe_dump
@@ -298,7 +240,7 @@ def within(value: Any) -> Iterator[tuple[Any, Any]]:
         yield from within(inner)
 
 
-DAMAGE = (cut_off, altered, huge_number, turned)
+DAMAGE = (cut_off, altered, huge_number)
 
 
 def damaged(content: bytes, file: str, rng: np.random.Generator) -> Iterator[bytes]:
@@ -406,21 +348,10 @@ def test_what_is_made_to_do_harm_is_refused_and_runs_nothing(
     assert not (tmp_path / 'trapped').exists()
 
 
-ODD: dict[str, Callable[[Path], None]] = {
-    'named pipe': os.mkfifo,
-    'zeros': lambda path: path.symlink_to('/dev/zero'),
-    'link to itself': lambda path: path.symlink_to(path.name),
-}
-
-
-@pytest.mark.parametrize(('name', 'file'), [case for case in CASES if case[1] != 'message'])
-def test_a_pipe_a_device_and_a_folder_are_refused_at_once(
-    name: str, file: str, good: dict[str, Path], tmp_path: Path
-) -> None:
+@pytest.mark.parametrize(('name', 'file'), CASES)
+def test_a_pipe_is_refused_at_once(name: str, file: str, good: dict[str, Path], tmp_path: Path) -> None:
     shutil.copytree(good[name], tmp_path, dirs_exist_ok=True)
-
-    for make in ODD.values():
-        (tmp_path / file).unlink(missing_ok=True)
-        make(tmp_path / file)
-        # A folder without metadata stands for the bags in it.
-        assert answer(READERS[name], tmp_path) or file == 'bag/metadata.yaml'
+    (tmp_path / file).unlink()
+    os.mkfifo(tmp_path / file)
+    # A folder without metadata stands for the bags in it.
+    assert answer(READERS[name], tmp_path) or file == 'bag/metadata.yaml'
