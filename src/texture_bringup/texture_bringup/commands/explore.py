@@ -38,17 +38,8 @@ from texture_core.errors import (
 from texture_core.types import ExplorationRequest, ExplorationState, TextureEstimate
 from texture_estimation.model import load_model
 from texture_estimation.next_motion import slide_values
+from texture_evaluation import collection
 from texture_evaluation.check import check_finger, store_reference
-from texture_evaluation.collection import (
-    CollectionEnd,
-    CollectionParams,
-    Patch,
-    PlaceAccuracy,
-    PlacePlan,
-    evaluate_places,
-    next_bag,
-)
-from texture_evaluation.collection import collect as collect_places
 from texture_exploration.motions import MOTIONS
 from texture_exploration.presets import load_preset
 from texture_features.correction import read_reference
@@ -295,8 +286,8 @@ BAGS_LOG = logging.getLogger('texture_recordings.bags')
 
 
 def collect_surface(
-    operator: Operator, surface: str, folder: Path, params: CollectionParams, namespace: str = ''
-) -> tuple[CollectionEnd, Path | None]:
+    operator: Operator, surface: str, folder: Path, params: collection.CollectionParams, namespace: str = ''
+) -> tuple[collection.CollectionEnd, Path | None]:
     """Collect a surface; return how it ended, and the bag, which is complete however that was, Ctrl-C included.
 
     A bag without any slide is removed; then None is returned instead.
@@ -307,10 +298,10 @@ def collect_surface(
             'no surface patch is taught: touch the corners of the surface with `texture touch-surface`, or give the '
             f'explorer {", ".join(PATCH)}'
         )
-    patch = Patch(low_x, high_x, low_y, high_y)
-    plan = PlacePlan(surface, params, patch, (low_n, high_n), (LEAST_SPEED_M_S, high_m_s))
+    patch = collection.Patch(low_x, high_x, low_y, high_y)
+    plan = collection.PlacePlan(surface, params, patch, (low_n, high_n), (LEAST_SPEED_M_S, high_m_s))
     folder.mkdir(parents=True, exist_ok=True)
-    bag = folder / next_bag([one.name for one in folder.iterdir()], surface)
+    bag = folder / collection.next_bag([one.name for one in folder.iterdir()], surface)
     with recorder(operator, bag, namespace) as check:
 
         def explore(request: ExplorationRequest) -> tuple[ExplorationError, str]:
@@ -321,7 +312,7 @@ def collect_surface(
                 return error.error, str(error)
             return explored.error, explored.message
 
-        end = collect_places(plan, params, explore, partial(_evaluate_bag, bag, surface), _print_progress)
+        end = collection.collect(plan, params, explore, partial(_evaluate_bag, bag, surface), _print_progress)
     # Where the recorder has ended, the bag there may be another one.
     if end.slides or end.error is CollectionError.NOT_RECORDED:
         return end, bag
@@ -335,7 +326,7 @@ def _print_progress(sentence: str, slides: int) -> None:
     print(f'{slides} slides: {sentence}', flush=True)
 
 
-def _evaluate_bag(bag: Path, surface: str, slides: int) -> PlaceAccuracy:
+def _evaluate_bag(bag: Path, surface: str, slides: int) -> collection.PlaceAccuracy:
     """Evaluate all bags of the folder, once the newest one has `slides` slides on the disk."""
     feature_set = FeatureSet.load(RECIPE)
     deadline_s = time.monotonic() + FLUSHED_S
@@ -348,7 +339,7 @@ def _evaluate_bag(bag: Path, surface: str, slides: int) -> PlaceAccuracy:
             BAGS_LOG.disabled = False
         written = sum(one.bag == bag for one in dataset)
         if written >= slides or time.monotonic() > deadline_s:
-            return evaluate_places(dataset.features(feature_set), surface)
+            return collection.evaluate_places(dataset.features(feature_set), surface)
 
 
 @contextmanager
@@ -378,7 +369,7 @@ def _configure_collect(parser: argparse.ArgumentParser) -> None:
     shape: dict[str, Any] = {'type': float, 'nargs': 2, 'default': (0.0, 0.0), 'metavar': ('LOW', 'HIGH')}
     parser.add_argument('--speed', help='speeds of the slides (default: 0.02 to 0.05), m/s', **shape)
     parser.add_argument('--force', help='normal forces of the slides (default: 1 to 2), N', **shape)
-    add_parameters(parser, CollectionParams, without=SHORTER)
+    add_parameters(parser, collection.CollectionParams, without=SHORTER)
     parser.add_argument(
         '--distance', type=float, default=0.04, metavar='M', help='length of each slide (default: 0.04)'
     )
@@ -388,7 +379,7 @@ def _configure_collect(parser: argparse.ArgumentParser) -> None:
 def _collect(options: argparse.Namespace) -> int:
     """Collect, and report how well left-out places are recognised; return 0 if the bound is met, else 1."""
     given = dict(zip(SHORTER, (options.distance, *options.speed, *options.force), strict=True))
-    params = parameters_from(options, CollectionParams, given)
+    params = parameters_from(options, collection.CollectionParams, given)
     with Operator(options.namespace) as operator:
         operator.wait_for_explorer(EXPLORER_S, SOON_S)
         end, bag = collect_surface(operator, options.surface, options.folder, params, options.namespace)
