@@ -54,8 +54,9 @@ def test_what_ended_an_exploration_stands_on_lines_of_its_own_below_the_progress
     assert below[1:] == lines
 
 
-@pytest.mark.parametrize('last', ['aborted', 'refused', 'vanished'])
-def test_slides_in_several_directions_end_with_the_first_that_fails(monkeypatch, capsys, last):
+@pytest.mark.parametrize('json', [[], ['--json']], ids=['text', 'json'])
+@pytest.mark.parametrize(('last', 'code'), [('aborted', 4), ('refused', 2), ('vanished', 4)])
+def test_slides_in_several_directions_end_with_the_first_that_fails(monkeypatch, capsys, last, code, json):
     """Whatever aborted a slide, somebody has to look at it: an operator who is away must not find the finger worn."""
     nothing = TextureEstimate(0, ''), RoughnessEstimate(0, '')
     made = ExplorationResult(ExplorationError.NONE, 'the motion was completed', 'one', *nothing)
@@ -67,7 +68,7 @@ def test_slides_in_several_directions_end_with_the_first_that_fails(monkeypatch,
     operator = MagicMock()
     operator.__enter__.return_value.explore.side_effect = [made, made, ends[last]]
     monkeypatch.setattr('texture_bringup.commands.explore.Operator', lambda _namespace: operator)
-    assert main(['explore', 'linear_slide', '--direction', '0', '180', '45.5', '180']) != 0
+    assert main(['explore', 'linear_slide', *json, '--direction', '0', '180', '45.5', '180']) == code
     asked = [call.args[0] for call in operator.__enter__.return_value.explore.call_args_list]
     assert [round(math.degrees(one.direction_rad)) for one in asked] == [0, 180, 46]
     assert '2 of 4 slides were made\n' in capsys.readouterr().err

@@ -101,21 +101,23 @@ def _configure_explore(parser: argparse.ArgumentParser) -> None:
 
 
 def _explore(options: argparse.Namespace) -> int:
-    """Explore once in each direction, until one has no success; return the worst end, see `exit_code`."""
+    """Explore once in each direction, until one has no success; return that, else the worst end, see `exit_code`."""
     requests, made, code = requests_of(options), 0, 0
     try:
         with Operator(options.namespace) as operator:
             operator.wait_for_explorer(EXPLORER_S, SOON_S)
             for request in requests:
                 result = explored(operator.explore, request)
-                code = max(code, exit_code(result))
                 if options.json:
                     print(json.dumps(as_json(result)), flush=True)
                 else:
                     print_result(result)
                 if not result.success:
-                    break
-                made += 1
+                    return exit_code(result)
+                made, code = made + 1, max(code, exit_code(result))
+    except MotionAborted as error:  # the explorer does not answer any more: it may have moved
+        print(f'texture: {error}', file=sys.stderr)
+        return ABORTED
     finally:
         if made < len(requests) > 1:
             print(f'{made} of {len(requests)} slides were made', file=sys.stderr)
