@@ -102,7 +102,7 @@ def picture(frame: Frame, peak: float) -> Group:
     return Group(
         rows,
         Text(f'texture    {texture["text"]}', style=f'bold {style}'),
-        Text(f'roughness  {roughness["text"]}' if roughness['text'] else ''),
+        *([Text(f'roughness  {roughness["text"]}')] if roughness['text'] else []),
         *(Text(f'{light["name"]}: {light["message"]}', style=light['colour']) for light in faults),
     )
 
