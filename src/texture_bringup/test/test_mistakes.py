@@ -113,6 +113,7 @@ def test_the_models_are_good_and_the_figures_are_written(data, capsys, tmp_path)
         ('launch emulatr', "no launch file 'emulatr'; did you mean 'emulator'?"),
         ('launch emulator surfcae:=glass', "did you mean 'surface'?"),
         ('launch emulator surface', 'write NAME:=VALUE'),
+        ('launch ros_controllers preset:=moveit_serv', "did you mean 'moveit_servo'?"),
         ('launch emulator surface:=glas', "no surface 'glas'; did you mean 'glass'?"),
         ('launch emulator recipe:=defualt', "did you mean 'default'?"),
         ('launch emulator model:=nowhere', "there is no model 'nowhere'"),
