@@ -11,6 +11,7 @@ from texture_benchmarks.generalisation import generalisation_chart
 from texture_benchmarks.overview import computing_chart, sliding_chart
 from texture_benchmarks.scale import scale_chart
 from texture_benchmarks.scenes import ablation_chart
+from texture_benchmarks.trust import failures_chart
 from texture_bringup.command import main
 
 pytestmark = pytest.mark.ros
@@ -33,6 +34,7 @@ def test_every_benchmark_has_its_line_on_the_page_and_make_runs_some() -> None:
         ('overview', computing_chart, ()),
         ('scale', scale_chart, ('textures, default',)),
         ('scenes', ablation_chart, ()),
+        ('trust', failures_chart, ()),
     ],
 )
 def test_the_charts_of_the_pages_can_be_drawn_from_the_stored_figures(name, draw, keys, tmp_path: Path) -> None:

@@ -12,11 +12,7 @@ from texture_benchmarks.trust import (
     ROWS,
     UNDISTURBED,
     VIBRATION,
-    breakdown,
-    breakdown_strengths,
-    breakdowns,
     disturbed,
-    ordered,
     outcome,
     run,
 )
@@ -53,23 +49,6 @@ def test_wear_halves_the_power_at_its_cut_off_and_half_the_speed_the_frequency()
     assert changed('wear', 20.0, np.sin(2 * np.pi * 20.0 * time_s)).var() / tone.var() == pytest.approx(0.5, abs=0.05)
     slower = changed('speed', 0.5, tone)
     np.testing.assert_allclose(slower[100:-100], np.sin(2 * np.pi * 50.0 * time_s)[100:-100], atol=0.01)
-
-
-@pytest.mark.parametrize(
-    ('fractions', 'expected'),
-    [((1.0, 0.95, 0.85), 1.5), ((0.5, 0.4), 0.5), ((1.0, 0.9), None), ((0.0, 0.0), None)],
-)
-def test_a_curve_breaks_down_where_it_crosses_nine_tenths_of_its_start(fractions, expected) -> None:
-    assert breakdown(range(len(fractions)), fractions) == (expected and pytest.approx(expected))
-
-
-def test_factors_break_down_on_both_sides_of_one() -> None:
-    ends = {name: {'slides': 10, 'label_right': 10} for _, name in ordered(ROWS['gain'])}
-    worst = {'slides': 10, 'label_right': 0}
-    lowest, *_, highest = (name for _, name in ordered(ROWS['gain']))
-    found = breakdowns(ROWS['gain'], {**ends, lowest: worst, highest: worst})
-    assert found == pytest.approx([0.9, 7.1])
-    assert breakdown_strengths(ROWS['gain'], {**ends, lowest: worst, highest: worst}) == pytest.approx([0.68, 1.46])
 
 
 def test_what_the_training_covers_is_read_from_the_recipe() -> None:

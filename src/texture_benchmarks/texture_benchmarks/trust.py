@@ -161,8 +161,6 @@ SPLIT = (
 )
 QUICK_COMPARED, QUICK_ROWS, QUICK_SELECTED = ('default', PEER), ('gain', 'hidden losses'), ('1-9', '10-15', '10-15')
 UNDISTURBED = 'undisturbed'
-MAX_ACCEPTED_WRONG = 2 / 60
-KEPT = 0.9  # of the labels that are right without a disturbance: below it, a recipe has broken down
 
 
 def outcome(results: Sequence[SlideResult]) -> dict[str, Any]:
@@ -192,10 +190,9 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Train on undisturbed slides, and test on later ones under disturbances, one at a time.
 
     Slides that are accepted and correct, rejected, or accepted but wrong, at the first decided estimate and at the
-    end, and slides whose label is right, accepted or not; breakdown: strengths at which these fall below 90 % of those
-    without a disturbance, linear between strengths. Unknown: slides over materials that were not trained, accepted
-    all the same. The estimates have no information of the disturbance. 95 % intervals by
-    bootstrap over surfaces, or exact over slides where these are wider.
+    end, and slides whose label is right, accepted or not. Unknown: slides over materials that were not trained,
+    accepted all the same. The estimates have no information of the disturbance. 95 % intervals by bootstrap over
+    surfaces, or exact over slides where these are wider.
     """
     rows, compared = (QUICK_ROWS, QUICK_COMPARED) if options.quick else (tuple(ROWS), COMPARED)
     slides = recorded(options, 'biotac20', ('1-15', QUICK_MATERIALS))
@@ -223,13 +220,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
             'accepted_wrong': metrics.accepted_wrong(clean[name]),
             'rejected': metrics.rejected(clean[name]),
             'early': metrics.early_decision(clean[name]),
-            'above_allowed': [
-                row
-                for row, one in outcomes[name].items()
-                if max(one['early_wrong'], one['final_wrong']) > MAX_ACCEPTED_WRONG * one['slides']
-            ],
             'outcomes': outcomes[name],
-            'breakdown': {row: breakdown_strengths(ROWS[row], outcomes[name]) for row in rows},
         }
         for name in models
     }
@@ -277,36 +268,6 @@ def ordered(sweep: DisturbanceSweep) -> list[tuple[float, str]]:
     return sorted([*measured, clean]) if sweep.is_factor else [clean, *measured]
 
 
-def breakdown(places: Sequence[float], accuracies: Sequence[float]) -> float | None:
-    """Return where a curve first falls below KEPT of its start, linear between places; None if it never does."""
-    limit = KEPT * accuracies[0]
-    below = next((index for index, accuracy in enumerate(accuracies) if accuracy < limit), 0)
-    if not below:
-        return None
-    fallen = (accuracies[below - 1] - limit) / (accuracies[below - 1] - accuracies[below])
-    return float(places[below - 1] + fallen * (places[below] - places[below - 1]))
-
-
-def breakdowns(sweep: DisturbanceSweep, outcomes: Mapping[str, Mapping[str, Any]]) -> list[float]:
-    """Return the places on the axis of a sweep, 0 for its first strength, where the accuracy breaks down."""
-    rows = ordered(sweep)
-    accuracies = [outcomes[name]['label_right'] / outcomes[name]['slides'] for _, name in rows]
-    clean = [name for _, name in rows].index(UNDISTURBED)
-    sides = (list(range(clean, -1, -1)), list(range(clean, len(rows))))
-    found = [breakdown(side, [accuracies[place] for place in side]) for side in sides]
-    return [place for place in found if place is not None]
-
-
-def breakdown_strengths(sweep: DisturbanceSweep, outcomes: Mapping[str, Mapping[str, Any]]) -> list[float]:
-    """Return the strengths at these places; below an infinite one, the first that was measured."""
-    strengths = [strength for strength, _ in ordered(sweep)]
-    found = []
-    for place in breakdowns(sweep, outcomes):
-        before, after = strengths[math.floor(place)], strengths[math.ceil(place)]
-        found.append(after if math.isinf(before) else before + (place % 1.0) * (after - before))
-    return found
-
-
 # --------------------
 # The chart.
 
@@ -352,9 +313,6 @@ def _draw_sweep(lines: Any, strip: Any, sweep: DisturbanceSweep, numbers: Mappin
         low, high = 100 * np.array([end['interval'] for end in ends]).T
         lines.fill_between(places, low, high, color=colour, alpha=0.13, linewidth=0)
         lines.plot(places, accuracy, color=colour, marker=marker, markersize=4, label=label)
-    for place in breakdowns(sweep, numbers[OURS]['outcomes']):
-        lines.axvline(place, color=COLOURS[0], linestyle=':')
-    lines.plot([], [], color=COLOURS[0], linestyle=':', label=f'{OURS} breaks down: 90 % of undisturbed')
     lines.set(ylim=(0, 105), xticks=places, xlim=(-0.5, len(rows) - 0.5))
     lines.tick_params(labelbottom=False)
     outcomes_of_rows = [numbers[OURS]['outcomes'][row] for _, row in rows]
