@@ -18,18 +18,16 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
-from unittest import mock
 
 import numpy as np
 from geometry_msgs.msg import TwistStamped, WrenchStamped
 
-from texture_benchmarks.ros.graph import Graph
 from texture_benchmarks.study import BenchmarkResult
-from texture_bringup.demo import free_domain, isolated
+from texture_bringup.demo import free_domain
 from texture_bringup.operator import Operator
 from texture_core.errors import LaunchFailed, TextureError
 from texture_core.ros import to_ns
-from texture_core.ros_testing import NodeProcess
+from texture_core.ros_testing import LocalGraph, NodeProcess
 from texture_core.types import NANOSECONDS, ExplorationRequest, ExplorationState, Phase
 from texture_evaluation.train import train_from_bags
 from texture_exploration.safety import SafetyLimits
@@ -140,27 +138,35 @@ def check(trials: Sequence[FaultTrial], ended: int) -> dict[str, Any]:
 # The run.
 
 
-class Rig(Graph):
+class Rig(LocalGraph):
     """All nodes as processes, an operator who explores with them, and injected faults; use it in a `with` block."""
 
     def __init__(self, domain_id: int, given: Mapping[str, Mapping[str, Any]]) -> None:
-        super().__init__(domain_id, 'watcher')
-        self._domain_id, self._given, self._nodes = domain_id, given, dict[str, NodeProcess]()
+        super().__init__(domain_id)
+        self._given, self._nodes, self._over = given, dict[str, NodeProcess](), threading.Event()
         self._operator, self._other = Operator(domain_id=domain_id), Operator(domain_id=domain_id)
         self.ended = 0  # nodes that ended by themselves
         self._forces: list[tuple[float, float]] = []
-        self.node.create_subscription(WrenchStamped, 'true_wrench', self._on_wrench, 1000)
-        self._thread = threading.Thread(target=self._executor.spin, daemon=True)
+
+    def __enter__(self) -> Rig:
+        super().__enter__()
+        self.peer.create_subscription(WrenchStamped, 'true_wrench', self._on_wrench, 1000)
+        self._thread = threading.Thread(target=self._spin)
         self._thread.start()
+        return self
 
     def __exit__(self, *_: object) -> None:
         for name in reversed(self._nodes):  # the explorer first, which lifts the finger
             self._nodes[name].stop()
         for operator in (self._operator, self._other):
             operator.__exit__(None, None, None)
-        self._executor.shutdown()
+        self._over.set()
         self._thread.join()
         super().__exit__()
+
+    def _spin(self) -> None:
+        while not self._over.is_set():
+            self.spin_once()
 
     def _on_wrench(self, wrench: WrenchStamped) -> None:
         force = wrench.wrench.force
@@ -171,7 +177,7 @@ class Rig(Graph):
         if name in self._nodes:
             self._nodes[name].stop()
         given = {**self._given[name], **more}
-        node = self._nodes[name] = NodeProcess(PACKAGES[name], name, given, domain_id=self._domain_id)
+        node = self._nodes[name] = NodeProcess(PACKAGES[name], name, given)
         node.__enter__()
         deadline_s = time.monotonic() + ANSWERS_S
         while name == 'explorer' and time.monotonic() < deadline_s:
@@ -257,14 +263,14 @@ class Rig(Graph):
 
     def _command(self, end_s: float) -> None:
         """Also command the arm, along the surface."""
-        publisher = self.node.create_publisher(TwistStamped, 'twist_controller/twist', 1)
+        publisher = self.peer.create_publisher(TwistStamped, 'twist_controller/twist', 1)
         twist = TwistStamped()
         twist.header.frame_id, twist.twist.linear.y = 'base', 0.01
         while time.monotonic() < end_s:
-            twist.header.stamp = self.node.get_clock().now().to_msg()
+            twist.header.stamp = self.peer.get_clock().now().to_msg()
             publisher.publish(twist)
             time.sleep(POLL_S)
-        self.node.destroy_publisher(publisher)
+        self.peer.destroy_publisher(publisher)
 
 
 def soak(
@@ -290,7 +296,6 @@ def soak(
             'classifier': {'model': card},
             'explorer': {'arm': 'ros_controllers', **PATIENT, **NOT_LATE, **PATCH, **EMULATED},
         }
-        stack.enter_context(mock.patch.dict(os.environ, isolated(domain_id, os.environ)))
         running = stack.enter_context(Rig(domain_id, given))
         for name in PACKAGES:
             running.start(name)
