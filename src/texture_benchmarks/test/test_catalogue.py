@@ -55,7 +55,6 @@ def test_a_mistake_is_answered_with_one_sentence_and_exit_code_2(arguments, sent
 @pytest.mark.parametrize(
     ('arguments', 'sentence'),
     [
-        ('benchmark latency --only biotac20', "--only is 'biotac20'; `generalisation` alone"),
         ('benchmark latency --out /proc/x', "'/proc/x' cannot be used"),
         ('endurance --duration 0', '--duration is 0; it must be above 0'),
     ],

@@ -48,7 +48,6 @@ class BenchmarkOptions:
     seed: int = 0  # Of everything random
     quick: bool = False  # Fewer repetitions, for tests; such numbers are not for publishing
     budget_s: float = math.inf  # After this time a study that has parts ends with those that it has
-    only: str = ''  # The one data set of `generalisation` that is measured; '' for all
 
     def has(self, name: str) -> bool:
         """Return whether there is a recorded data set of this name."""
