@@ -31,7 +31,7 @@ BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
     'papers': papers.run,  # the papers' recipes on recordings, at the same and at another place of a track
     'trust': trust.run,  # where recognition fails: how slides end under disturbances and over unknown materials
     'learning': learning.run,  # textures added slide by slide, and slides needed with chosen motions
-    'motion': motion.run,  # force, speed and circle by robot and surface; where force control is stable
+    'motion': motion.run,  # forces in virtual time by stiffness, delay and fault
     'scenes': scenes.run,  # cost of simulated slides and devices; what each term of a scene contributes
 }
 

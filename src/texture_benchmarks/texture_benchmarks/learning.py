@@ -25,7 +25,6 @@ from texture_estimation.model import TextureModel
 from texture_estimation.next_motion import NextTouchModel
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.training import train
-from texture_evaluation.charts import COLOURS, chart
 from texture_evaluation.cross_validation import predict_slides
 from texture_evaluation.metrics import window_accuracy
 from texture_evaluation.train import training_examples
@@ -250,7 +249,6 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         split=f'{count} draws of {size} new materials: trained on slides 1-{last_training} of the others, trained '
         f'slide by slide from slide 1 on, tested on the slides after {last_training} of all',
         numbers={**_numbers(runs, draws, stages), 'chosen_motions': chosen},
-        charts=(_chart(runs, stages, size, options.out / 'learning.png'),),
     )
 
 
@@ -275,22 +273,3 @@ def _numbers(runs: Sequence[tuple[Any, ...]], draws: Sequence[Any], stages: Sequ
             'longest': round(float(add_ms.max()), 1),
         },
     }
-
-
-def _chart(runs: Sequence[tuple[Any, ...]], stages: Sequence[int], new: int, path: Path) -> Path:
-    """Draw slides and windows right over the number of slides of each new texture, mean and range over the draws."""
-    lines = (('incremental', 'added one slide at a time', COLOURS[0]), ('retrained', 'trained again', COLOURS[1]))
-    title = f'{new} new materials added to the others (BioTac, later slides of all)'
-    with chart(path, (8.0, 4.8), title, points=11.0) as figure:
-        axes = figure.subplots()
-        for what, dashes in (('slides', '-'), ('windows', '--')):
-            for which, how, colour in lines:
-                right = 100 * np.array([[scores[stage][which][what] for scores, *_ in runs] for stage in stages])
-                axes.plot(stages, right.mean(axis=1), dashes, marker='o', color=colour, label=f'{how}: {what}')
-                axes.fill_between(stages, right.min(axis=1), right.max(axis=1), color=colour, alpha=0.15, linewidth=0)
-        axes.set(xscale='log', xlabel='slides of each new material', ylabel='right (%), range of draws')
-        axes.set_ylim(None, 101)
-        axes.set_xticks(stages, [f'{stage}' for stage in stages])
-        axes.minorticks_off()
-        figure.legend(loc='outside lower center', ncols=2)  # the lines leave no corner free
-    return path

@@ -84,7 +84,7 @@ PACKAGES = {
 }
 # Patient with a busy machine; what comes 0.5 s late is too late all the same.
 PATIENT = {'connect_timeout_s': 10.0, 'deadman_s': 0.4, 'approach_timeout_s': 60.0,
-           'state_timeout_s': 1.0, 'signal_timeout_s': 1.0}  # fmt: skip
+           'state_timeout_s': 1.0, 'signal_timeout_s': 1.5}  # fmt: skip
 PATCH = {'patch_x_low_m': -0.02, 'patch_x_high_m': 0.1, 'patch_y_low_m': -0.05, 'patch_y_high_m': 0.05}
 EMULATED = {'accept_no_timeout': True, 'accept_shared_group': True, 'approach_stiffness_n_m': 2e4}
 RESPAWNED = ('sensor', 'feature_extractor', 'classifier')  # what moves a robot, no launch file starts again
