@@ -71,15 +71,16 @@ def run_incremental(
             add_s.append(time.process_time() - began_s)
         retrained = train(recipe, examples.take(training & (~is_new | (numbers <= stage))))
         scores[stage] = {
-            'incremental': _score(incremental.model, examples.take(test)),
-            'retrained': _score(retrained, examples.take(test)),
-            NEW_ONES: _score(incremental.model, examples.take(test & is_new)),
-            OLD: _score(incremental.model, examples.take(test & ~is_new)),
+            'incremental': score(incremental.model, examples.take(test)),
+            'retrained': score(retrained, examples.take(test)),
+            NEW_ONES: score(incremental.model, examples.take(test & is_new)),
+            OLD: score(incremental.model, examples.take(test & ~is_new)),
         }
-    return scores, _score(base, examples.take(test & ~is_new)), add_s
+    return scores, score(base, examples.take(test & ~is_new)), add_s
 
 
-def _score(model: TextureModel, examples: LabelledFeatures) -> dict[str, float]:
+def score(model: TextureModel, examples: LabelledFeatures) -> dict[str, float]:
+    """Return the accuracy of the windows and of the whole slides."""
     results = list(predict_slides(model, examples).values())
     slides = float(np.mean([one.end.label == one.surface for one in results]))
     return {'windows': window_accuracy(results), 'slides': slides}
