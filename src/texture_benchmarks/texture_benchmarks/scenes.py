@@ -8,7 +8,7 @@ import itertools
 import time
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,6 @@ from texture_evaluation.charts import COLOURS, chart
 from texture_papers import jamali_experiment, roberge_experiment
 from texture_papers.protocol import PaperProtocol, folds, halves, of_task
 from texture_simulation.effects import (
-    EFFECTS,
     FingerSpread,
     ForceGain,
     PatchGrowth,
@@ -96,9 +95,6 @@ REMOVED_EFFECTS: Mapping[str, Mapping[str, Any]] = {
     },
     'sticky': {'patch_growth': PatchGrowth(), 'unevenness': Unevenness(0.1)},
 }
-# Effects that no scene names: each alone is added to `HOST`, with the default strength, to be measured.
-HOST = 'twelve_textures'
-ADDED = ('skids',)
 
 
 def completed(scene: Scene, touch_protocol: TouchProtocol) -> Scene:
@@ -301,12 +297,8 @@ COLUMNS = 2
 
 
 def ablation_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
-    """Draw for each scene how the accuracy changes when a term is left out; the last panel is of terms put in."""
-    added = {term: row[term] for term, row in numbers['added'].items()}
-    without = np.mean(
-        [row['accuracy'] + row[term]['accuracy_without']['change'] for term, row in numbers['added'].items()]
-    )
-    panels = {**numbers['terms'], f'{HOST}, with one of': {'accuracy': float(without), **added}}
+    """Draw for each scene how the accuracy changes when a term is left out."""
+    panels = numbers['terms']
     terms = {name: {t: row for t, row in figures.items() if isinstance(row, dict)} for name, figures in panels.items()}
     rows = -(-len(panels) // COLUMNS)
     size = (9.0, 0.9 + rows * (0.8 + 0.27 * max(map(len, terms.values()))))
@@ -348,12 +340,11 @@ QUICK = (('ets_linear', 'sticky'), 32, 2, 1, 2, 10)
 
 
 def run(options: BenchmarkOptions) -> BenchmarkResult:
-    """Time slides, remove each term of each scene in turn, and add what none of them names.
+    """Time slides, and remove each term of each scene in turn.
 
     Computing time (ms) of a slide of 0.5 s with all channels, alone and as one of many at once, median over surfaces;
     accuracy of a linear discriminant (shrunk covariance) on the logarithm of 24 bands of the spectrum of each channel,
-    with and without each term; the effects that no scene names are put into one scene one at a time, as strong as the
-    catalogue has them.
+    with and without each term.
     """
     names, slides, repeats, paper_repeats, scan_repeats, many = QUICK if options.quick else FULL
     costs, terms = dict[str, Any](), dict[str, Any]()
@@ -367,16 +358,10 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         fewer = slides // FEWER.get(name, 1)
         row = ablate(scene, variants(scene, touch_protocol), touch_protocol, fewer, repeats=repeats, seed=options.seed)
         terms[name] = with_paper(row, name, paper_repeats, 1000 + options.seed, quick=options.quick)
-    added = {}
-    for name in ADDED:
-        host, effect = load_scene(HOST), EFFECTS[name]()
-        more = replace(host, effects={**host.effects, name: effect})
-        row = ablate(more, {name: host}, TOUCH_PROTOCOLS[HOST], slides, repeats=repeats, seed=options.seed)
-        added[name] = {'strength': asdict(effect), **row}
     return BenchmarkResult(
         data='simulated scenes; slides of 2 and 3 s are cut to 1 s; terms that left a scene are put back for it',
         split=f'{slides} slides for training (jamali a third, sticky a fifth), others for test, {repeats} repetitions; '
         f"the papers' methods on {paper_repeats} sets of slides as many as in the paper; intervals of {CONFIDENCE:.0%}",
-        numbers={'scan_ms': costs, 'terms': terms, 'added': added},
-        charts=(ablation_chart({'terms': terms, 'added': added}, options.out / 'scenes_ablation.png'),),
+        numbers={'scan_ms': costs, 'terms': terms},
+        charts=(ablation_chart({'terms': terms}, options.out / 'scenes_ablation.png'),),
     )
