@@ -96,8 +96,12 @@ def test_what_is_trained_from_either_end_lies_in_no_test_of_another_stretch() ->
     assert places == {'6-10/10'} == {name.rpartition(' part ')[2] for name in turned.trained}
 
 
-def test_what_is_finished_is_not_computed_again_and_what_is_not_is_named(tmp_path: Path) -> None:
-    options = BenchmarkOptions(tmp_path, quick=True, budget_s=0.01)
+def test_what_is_finished_is_not_computed_again_and_what_fails_is_named(tmp_path: Path, monkeypatch) -> None:
+    def fails(*_: object) -> None:
+        raise InvalidData('too few slides')
+
+    monkeypatch.setattr(generalisation, '_run_part', fails)
+    options = BenchmarkOptions(tmp_path, quick=True)
     row, cell = 'simulated, no gap', figures([ended('cork', 'cork', accepted=True, cluster='a')])
     line = {'part': f'simulated track, {SVC}', 'found': [[HALVES, row, SVC, cell]]}
     (tmp_path / generalisation.FINISHED).write_text(json.dumps(line) + '\n')

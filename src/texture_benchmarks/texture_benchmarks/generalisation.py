@@ -130,7 +130,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     }
     order = sorted(parts, key=lambda name: (parts[name][2] == peers.CNN, parts[name][2] not in SLOW))
     work = partial(_run_part, slides, options.seed)
-    found = resumed(work, {name: parts[name] for name in order}, options.out / FINISHED, options)
+    found = resumed(work, {name: parts[name] for name in order}, options.out / FINISHED)
     numbers: dict[str, Any] = {table: {} for table in (DISTANCE, SPACING, HALVES, OTHER)}
     for table, row, recipe, cell in (one for name in parts if name in found for one in found[name]):
         numbers[table].setdefault(row, {})[recipe] = cell

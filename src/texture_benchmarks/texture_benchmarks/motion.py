@@ -421,7 +421,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     """
     seeds = 1 if options.quick else SEEDS
     planned = {', '.join(map(str, trial)): trial for trial in sweep(seeds, options.quick)}
-    ended = resumed(explored, planned, options.out / FINISHED, options)
+    ended = resumed(explored, planned, options.out / FINISHED)
     rows: defaultdict[str, Trials] = defaultdict(list)
     for name, end in ended.items():
         rows[planned[name].name].append((planned[name], TrialEnd(*end)))
