@@ -8,12 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from texture_exploration.force_control import (
-    ForceController,
-    LoopModel,
-    lowest_unstable_gain,
-    stability_limit_gain,
-)
+from texture_exploration.force_control import ForceController, LoopModel, lowest_unstable_gain, stability_limit_gain
 
 CYCLES = 60  # number of delays after which a simulated loop is evaluated
 SMALL = 0.1

@@ -8,15 +8,7 @@ import numpy as np
 import pytest
 
 from texture_benchmarks.study import BenchmarkOptions
-from texture_benchmarks.trust import (
-    ROWS,
-    UNDISTURBED,
-    VIBRATION,
-    disturbed,
-    outcome,
-    run,
-    trained_ranges,
-)
+from texture_benchmarks.trust import ROWS, UNDISTURBED, VIBRATION, disturbed, outcome, run, trained_ranges
 from texture_core.types import ExplorationState, Phase, Rejection, TactileSignal, TextureEstimate
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.metrics import SlideResult

@@ -8,17 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from texture_benchmarks import (
-    generalisation,
-    latency,
-    learning,
-    motion,
-    overview,
-    papers,
-    scale,
-    scenes,
-    trust,
-)
+from texture_benchmarks import generalisation, latency, learning, motion, overview, papers, scale, scenes, trust
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult
 from texture_core.config import find
 

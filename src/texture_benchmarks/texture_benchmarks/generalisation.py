@@ -50,7 +50,6 @@ DISTANCE, SPACING, HALVES, OTHER = 'distance', 'spacing', 'halves', 'other'
 PLACE_RECIPES = ('any-place-and-taxels', 'any-place', 'vibration-and-taxels', 'default')
 CELLS, CELL_CM = 8, 1.4
 SPACED = {'1, 7': (1, 7), '2, 6': (2, 6), '3, 5': (3, 5), '1, 3, 5, 7': (1, 3, 5, 7)}
-BETWEEN, THERE = 'between', 'at trained places'
 # Slides trained and tested: three draws, each trained before it is tested.
 DRAWS = {'1-20 → 21-30': ('1-20', '21-30'), '11-30 → 31-40': ('11-30', '31-40'), '1-20 → 31-40': ('1-20', '31-40')}
 LATER_DRAWS = tuple(DRAWS)[1:]
@@ -64,7 +63,6 @@ GAPS: Sequence[tuple[Span, Mapping[str, Span]]] = (
     ((0, 3), {'gap of 4.4 cm': (7, 10)}),
     ((2, 5), {'control of 4.4 cm': (5, 8)}),
 )
-QUARTER = 'three quarters, the fourth tested'
 # Controls that see no signal: whether the textures differ in how the robot slid over them.
 CONTROLS: Mapping[str, Callable[[LabelledSlide], tuple[float, ...]]] = {
     'force and speed alone': lambda one: (one.force_n, one.speed_m_s),
@@ -120,7 +118,13 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     draws.
     """
     chosen = {QUICK_SET: SETS[QUICK_SET]} if options.quick else SETS
-    slides = _read(chosen, options)
+    public = [name for name in chosen if not name.startswith('simulated')]
+    absent = [name for name in public if not options.has(name)]
+    if public and absent == public:
+        options.recordings(public[0])  # which is refused
+    if absent:
+        print(f"generalisation: '{options.data}' has no {', '.join(absent)}, left out", flush=True)
+    slides = {name: source.read(options) for name, source in chosen.items() if name not in absent}
     parts = {
         f'{part}, {recipe}': (name, part, recipe)
         for name in slides
@@ -135,9 +139,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     for table, row, recipe, cell in (one for name in parts if name in found for one in found[name]):
         numbers[table].setdefault(row, {})[recipe] = cell
     numbers['missing'] = [name for name in parts if name not in found]
-    numbers['missing'] += [
-        f'{part} (no recordings)' for name in chosen if name not in slides for part in SETS[name].parts
-    ]
+    numbers['missing'] += [f'{part} (no recordings)' for name in absent for part in SETS[name].parts]
     whole = all(numbers[table] for table in (DISTANCE, SPACING, OTHER))
     return BenchmarkResult(
         data=DATA_SETS,
@@ -145,17 +147,6 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         numbers=numbers,
         charts=(generalisation_chart(numbers, options.out / 'generalisation.png'),) if whole else (),
     )
-
-
-def _read(chosen: Mapping[str, Source], options: BenchmarkOptions) -> dict[str, SlideDataset]:
-    """Return the sets that are there, by name; where no recorded one is, refuse with what the first lacks."""
-    absent = [name for name in chosen if not name.startswith('simulated') and not options.has(name)]
-    there = [name for name in chosen if name not in absent]
-    if absent and all(name.startswith('simulated') for name in there):
-        options.recordings(absent[0])
-    if absent:
-        print(f"generalisation: '{options.data}' has no {', '.join(absent)}, left out", flush=True)
-    return {name: chosen[name].read(options) for name in there}
 
 
 def _run_part(slides: Mapping[str, SlideDataset], seed: int, part: tuple[str, str, str]) -> list[Figures]:
@@ -284,8 +275,8 @@ def _cells(whole: SlideDataset) -> Trials:
         for name, chosen in SPACED.items():
             between = [other for other in range(min(chosen) + 1, max(chosen)) if other not in chosen]
             spaced = {
-                (SPACING, f'{name}: {BETWEEN}'): [one for other in between for one in at[other]],
-                (SPACING, f'{name}: {THERE}'): [one for other in chosen for one in at[other]],
+                (SPACING, f'{name}: between'): [one for other in between for one in at[other]],
+                (SPACING, f'{name}: at trained places'): [one for other in chosen for one in at[other]],
             }
             trials.append(Trial(draw, names_of(slides, trained, *(places[cell] for cell in chosen)), spaced))
     return slides, trials
@@ -317,7 +308,7 @@ def _quarters(slides: SlideDataset) -> Trials:
         Trial(
             draw,
             names_of(parts, before, *(other for other in places if other != place)),
-            {(HALVES, QUARTER): names_of(parts, after, place)},
+            {(HALVES, 'three quarters, the fourth tested'): names_of(parts, after, place)},
         )
         for draw, (before, after) in DRAWS.items()
         for place in places

@@ -10,14 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 from texture_benchmarks.generalisation import Answer, Trial, answers_of, figures, names_of
-from texture_benchmarks.study import (
-    DATA,
-    QUICK_MATERIALS,
-    BenchmarkOptions,
-    BenchmarkResult,
-    map_forked,
-    recorded,
-)
+from texture_benchmarks.study import DATA, QUICK_MATERIALS, BenchmarkOptions, BenchmarkResult, map_forked, recorded
 from texture_estimation.recipe import Recipe, load_recipe
 
 # By the name in the table: a released recipe, with other windows and with another learner; half of a slide is shorter
@@ -34,8 +27,6 @@ RECIPES: Mapping[str, tuple[str, Mapping[str, float], Mapping[str, Any]]] = {
     'default, ours': ('default', {}, {}),
 }
 QUICK = ('ets-linear-svm-vote', 'kaboli-pa')
-PLACES = ('1/2', '2/2')
-EARLIER, LATER = '21-30', '31-40'
 SAME, PLACE = 'same track', 'other place'
 
 
@@ -57,11 +48,11 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     # Read the slides, and train and test every recipe at the halves of the track.
     whole = recorded(options, 'biotac20', ('1-12', QUICK_MATERIALS))
     slides = whole.select('1-12' if options.quick else '21-40').in_parts(2)
-    earlier, later = ('1-8', '9-12') if options.quick else (EARLIER, LATER)
+    earlier, later = ('1-8', '9-12') if options.quick else ('21-30', '31-40')
     numbers: dict[str, dict[str, Any]] = {SAME: {}, PLACE: {}}
     names = QUICK if options.quick else tuple(RECIPES)
     trials = []
-    for place, other in (PLACES, PLACES[::-1]):
+    for place, other in (('1/2', '2/2'), ('2/2', '1/2')):
         tested = {('', shift): names_of(slides, later, where) for shift, where in ((SAME, place), (PLACE, other))}
         trials.append(Trial(place, names_of(slides, earlier, place), tested))
 

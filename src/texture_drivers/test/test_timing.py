@@ -9,14 +9,7 @@ import itertools
 import numpy as np
 import pytest
 
-from texture_drivers.timing import (
-    HALF_WIDTH,
-    ArrivalNumbering,
-    Decimator,
-    RateMeter,
-    SampleCounter,
-    StreamClock,
-)
+from texture_drivers.timing import HALF_WIDTH, ArrivalNumbering, Decimator, RateMeter, SampleCounter, StreamClock
 from texture_drivers.tsf85 import SIGNAL, FingerStream, SampleFrame
 
 SECOND = 1_000_000_000

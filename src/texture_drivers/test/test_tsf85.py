@@ -20,16 +20,7 @@ from hypothesis import strategies as st
 
 from texture_core.types import NANOSECONDS, TactileSignal
 from texture_drivers.sensor import SensorParams
-from texture_drivers.tsf85 import (
-    AUTOSEND,
-    DYNAMIC,
-    STATIC,
-    TIMESTAMP,
-    Item,
-    Packet,
-    Tsf85,
-    Tsf85Parser,
-)
+from texture_drivers.tsf85 import AUTOSEND, DYNAMIC, STATIC, TIMESTAMP, Item, Packet, Tsf85, Tsf85Parser
 
 DEADLINE_S = 10.0
 
