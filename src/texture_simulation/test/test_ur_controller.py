@@ -137,7 +137,7 @@ def test_zeroing_under_load_hides_the_true_force(controller):
 
 
 def test_a_program_of_somebody_else_takes_no_commands_and_can_be_paused(controller):
-    dashboard = DashboardSession(controller, set(), lambda seconds: None)
+    dashboard = DashboardSession(controller, set())
 
     def ask(line):
         return dashboard.receive(line.encode() + b'\n').decode().strip()
@@ -226,8 +226,7 @@ def test_messages_may_come_in_pieces(session):
 
 
 def test_the_dashboard_answers_line_by_line(served):
-    silent = []
-    dashboard = DashboardSession(served, set(), silent.append)
+    dashboard = DashboardSession(served, set())
     assert dashboard.greeting == BANNER
     assert dashboard.receive(b'PolyscopeVersion\nrobot') == b'URSoftware 5.12.0.0 (emulated)\n'
     assert dashboard.receive(b'mode\n') == b'Robotmode: RUNNING\n'
@@ -235,5 +234,7 @@ def test_the_dashboard_answers_line_by_line(served):
     assert dashboard.receive(b'emulate protective stop\nsafetymode\n').endswith(b'Safetymode: PROTECTIVE_STOP\n')
     assert dashboard.receive(b'unlock protective stop\n').startswith(b'Cannot unlock')
     dashboard.receive(b'emulate silence 0.5\n')
-    assert silent == [0.5]
+    assert served.silent_s == 0.5
+    run(served, 0.6)
+    assert served.silent_s == 0.0
     assert dashboard.receive(b'emulate speed much\n') == b"came 'much'; a number of shares is needed\n"
