@@ -55,7 +55,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         cpu = timing['cpu_percent']
         timing['cpu_percent'] = {'sensor': driver, **cpu, 'all': round(driver + cpu['all'], 1)}
     return BenchmarkResult(
-        data='simulated TSF-85, scene bench',
+        data=f'simulated TSF-85, scene {SCENE}',
         split=f'trained on slides 1-{slides - 1} of each surface; timed on slide {slides}, live on a new one',
         numbers={'targets': TARGETS, **timings},
     )
