@@ -54,7 +54,7 @@ test-benchmarks: setup
 	@$(CLOCKED) -n $(BENCHMARK_JOBS) -m "benchmark and realtime" || $(call ALONE,benchmark and realtime)
 
 # Those that take minutes and explain how well and how fast surfaces are recognised.
-BENCHMARKS := latency hand papers roughness-latency learning
+BENCHMARKS := latency papers learning
 
 benchmark: setup
 	@failed=; for name in $(BENCHMARKS); do .venv/bin/texture benchmark $$name || failed="$$failed $$name"; done; \
