@@ -108,7 +108,13 @@ CLOCKS: dict[str, tuple[Write, dict, Truth]] = {
         [('cork', np.insert(X, 300, [np.nan] * 7))],
     ),
     'a counter of 16 bits in ms': (csv((6e4 * T).astype(int) % 2**16, X), timed('ms'), 'rate of .* is 1.667 Hz'),
-    'a counter of 16 bits in us': (csv((1e6 * T).astype(int) % 2**16, X), timed('us'), CORK),
+    'a counter of 16 bits in us': (
+        csv((1e6 * T).astype(int) % 2**16, X), timed('us'), 'rolls over every 0.0655 s, in which lost samples and a',
+    ),
+    'a counter of 16 bits in us at 15 Hz': (
+        csv((1e6 * T / 0.15).astype(int) % 2**16, X), timed('us'), 'rolls over every 0.0655 s, in which lost samples',
+    ),
+    'seconds of the minute by pause': (csv((T + 57) % 60, X), PAUSE, 'rolls over every 60 s does, or as another run'),
     'a counter of 32 bits in us': (csv(((1e6 * T).astype(int) + 2**32 - 10**6) % 2**32, X), timed('us'), CORK),
     'a counter of 31 bits in ms': (csv(((1e3 * T).astype(int) + 2**31 - 5000) % 2**31, X), timed('ms'), CORK),
     'a counter of 32 bits in ns': (csv(((1e9 * T).astype(int) + 2**32 - 10**8) % 2**32, X), timed('ns'), CORK),
@@ -142,7 +148,7 @@ CLOCKS: dict[str, tuple[Write, dict, Truth]] = {
     'logs overlap by few rows': (csv(np.r_[T[:300], T[297:]], np.r_[X[:300], X[297:]]), {}, CORK),
     'logs overlap': (
         csv(np.r_[T[:300], T[200:]], np.r_[X[:300], X[200:]]), {'slides': {'by': 'pause'}},
-        'row 302, .*the rows from here on are those from row 202 on',
+        'row 302, .*time goes back to 2 s, into the run that began at 0 s; save each row once',
     ),
 }  # fmt: skip
 
@@ -247,7 +253,7 @@ def alternating(*names: Any) -> Write:
 ROWS: dict[str, tuple[Write, dict, Truth]] = {
     **{
         f'sensors {names}': (
-            alternating(*names), {}, r"one value of 'sensor' after the other .*rows: \{sensor: ",
+            alternating(*names), {}, r"'sensor' changes from .* within a slide.*rows: \{sensor: ",
         )
         for names in (('S2', 'S1'), ('a', 'b', 'c'), (0, 1, 2, 3))
     },
@@ -259,9 +265,14 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
     ),
     'sensors at times of their own': (
         csv(np.ravel(np.c_[T, T + 0.005]).round(4), np.ravel(np.c_[X, Y]), ['a', 'b'] * N, names='t,x,id'), {},
-        r"one value of 'id' after the other \(a, b\).*rows: \{id: 'a'\}",
+        r"'id' changes from 'a' to 'b' within a slide.*rows: \{id: 'a'\}",
     ),
-    'sensors without times': (csv(np.ravel(np.c_[X, Y]), [1, 2] * N, names='x,id'), RATE, "one value of 'id' after"),
+    'sensors without times': (csv(np.ravel(np.c_[X, Y]), [1, 2] * N, names='x,id'), RATE, "row 3: .* 'id' changes"),
+    'sensors in blocks without times': (csv(X, np.repeat([1, 2], 300), names='x,id'), RATE, "row 302: .* 'id' changes"),
+    'trials that no key uses': (csv(T, X, np.repeat(range(6), 100), names='t,x,trial'), {}, "'trial' changes from '0'"),
+    'an index without a name': (
+        csv(range(N), X, names=',x'), {'streams': {'signal': {'columns': ['*'], 'rate_hz': 100.0}}}, CORK,
+    ),
     'a row of one signal': (
         csv(np.ravel(np.c_[X, Y]), [1, 2] * N, names='x,id'), {**RATE, 'rows': {'id': '*'}},
         [('cork', np.ravel(np.c_[X, Y]))],
@@ -349,13 +360,13 @@ CONTAINERS: dict[str, tuple[Write, dict, Truth]] = {
         records, {**ANY, 'streams': {'signal': {'columns': ['d.acc.*'], 'rate_hz': 100.0}}}, [('cork', np.c_[X, Y])],
     ),
     'parts that were never written': (h5(1000), {**ANY, **RATE}, 'has parts that were never written'),
-    'values with a scale': (h5(scale_factor=0.5, add_offset=3.0), {**ANY, **RATE}, [('cork', 0.5 * X + 3.0)]),
+    'values with a scale': (h5(scale_factor=0.5, add_offset=3.0), {**ANY, **RATE}, 'has the attribute add_offset'),
     'a WAV file that was cut': (wav(2 * N + 2000), SOUND, 'was cut off, .* declares 3200 bytes of sound and has 1200'),
     'a WAV file of a pipe': (wav(2**32 - 1), SOUND, 'or written to a pipe: it declares 4294967295 bytes'),
     'two sounds': (wav(2 * N, 2), SOUND, 'has 2 chunks of sound'),
     'trials as one slide': (
         npz(X=np.ones((20, 100, 3))), {**ANY, 'streams': {'signal': {'columns': ['X.*'], 'rate_hz': 100.0}}},
-        r'has trials; write slides: \{by: column, column: trial\}',
+        r'slides: \{by: column, column: trial\}',
     ),
     'a folder': (both(csv(T, X), lambda folder: (folder / 'felt_1.csv').mkdir()), {}, "'felt_1.csv' is a folder"),
 }  # fmt: skip
@@ -425,7 +436,7 @@ BAGS: dict[str, tuple[Write, Truth]] = {
     'a bag of ROS 1': (text('#ROSBAG V2.0', 'a_1.bag'), 'is a bag of ROS 1; convert it: rosbags-convert'),
     'a clock one hour ahead': (bag(3600.0), HALVES),
     'a clock that began at the start': (bag(-1.7e9 + 100.0), HALVES),
-    'sensors of two frames': (bag(frames=2), r"have the frames a, b.*rows: \{'/p/header.frame_id': 'a'\}"),
+    'sensors of two frames': (bag(frames=2), r"frame_id' changes from 'a' to 'b' .*rows: \{/p/header.frame_id: 'a'\}"),
     'sound': (sound, 'is sound whose messages do not tell the format; give a WAV file'),
     'a clock that is faster': (bag(3600.0, 0.5), r"topic '/p': the stamps differ .* and that changes by 2\.\d+ s"),
     'empty metadata': (both(bag(), emptied), HALVES),
@@ -505,9 +516,9 @@ def h5_of_holes(folder: Path) -> None:
 
 
 SIZES: dict[str, tuple[Write, str]] = {
-    'cells': (mat(matlab(1, 400_000_000)), "'cork_1.mat' cannot be read"),
+    'cells': (mat(matlab(1, 400_000_000)), 'declares more than 8 million values'),
     'cells in a cell': (mat(matlab(1, 1, matlab(1, 400_000_000, name=b''))), "'cork_1.mat' cannot be read"),
-    'numbers': (mat(matlab(6, 2_000_000_000, element(9, bytes(80)))), "'cork_1.mat' cannot be read"),
+    'numbers': (mat(matlab(6, 2_000_000_000, element(9, bytes(80)))), 'declares more than 8 million values'),
     'no rows': (h5_without_rows, 'declares more than 8 million values'),
     'a header': (csv(names=','.join(f'x{number}' for number in range(20_000))), 'has 20000 columns; at most 10000'),
     'holes': (h5_of_holes, 'declares more than 8 million values'),
