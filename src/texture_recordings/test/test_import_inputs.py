@@ -250,10 +250,11 @@ def alternating(*names: Any) -> Write:
     return csv(np.repeat(T, count), samples, list(names) * N, names='t,x,sensor')
 
 
+ID = "row {}, column 'id': it changes"
 ROWS: dict[str, tuple[Write, dict, Truth]] = {
     **{
         f'sensors {names}': (
-            alternating(*names), {}, r"'sensor' changes from .* within a slide.*rows: \{sensor: ",
+            alternating(*names), {}, r"column 'sensor': it changes .* within a slide.*rows: \{sensor: ",
         )
         for names in (('S2', 'S1'), ('a', 'b', 'c'), (0, 1, 2, 3))
     },
@@ -265,11 +266,11 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
     ),
     'sensors at times of their own': (
         csv(np.ravel(np.c_[T, T + 0.005]).round(4), np.ravel(np.c_[X, Y]), ['a', 'b'] * N, names='t,x,id'), {},
-        r"'id' changes from 'a' to 'b' within a slide.*rows: \{id: 'a'\}",
+        r"'id': it changes from 'a' to 'b' within a slide.*rows: \{id: 'a'\}",
     ),
-    'sensors without times': (csv(np.ravel(np.c_[X, Y]), [1, 2] * N, names='x,id'), RATE, "row 3: .* 'id' changes"),
-    'sensors in blocks without times': (csv(X, np.repeat([1, 2], 300), names='x,id'), RATE, "row 302: .* 'id' changes"),
-    'trials that no key uses': (csv(T, X, np.repeat(range(6), 100), names='t,x,trial'), {}, "'trial' changes from '0'"),
+    'sensors without times': (csv(np.ravel(np.c_[X, Y]), [1, 2] * N, names='x,id'), RATE, ID.format(3)),
+    'sensors in blocks without times': (csv(X, np.repeat([1, 2], 300), names='x,id'), RATE, ID.format(302)),
+    'trials that no key uses': (csv(T, X, np.repeat(range(6), 100), names='t,x,trial'), {}, "'trial': it changes"),
     'an index without a name': (
         csv(range(N), X, names=',x'), {'streams': {'signal': {'columns': ['*'], 'rate_hz': 100.0}}}, CORK,
     ),
@@ -436,16 +437,16 @@ BAGS: dict[str, tuple[Write, Truth]] = {
     'a bag of ROS 1': (text('#ROSBAG V2.0', 'a_1.bag'), 'is a bag of ROS 1; convert it: rosbags-convert'),
     'a clock one hour ahead': (bag(3600.0), HALVES),
     'a clock that began at the start': (bag(-1.7e9 + 100.0), HALVES),
-    'sensors of two frames': (bag(frames=2), r"frame_id' changes from 'a' to 'b' .*rows: \{/p/header.frame_id: 'a'\}"),
+    'sensors of two frames': (bag(frames=2), r"frame_id': it changes .*rows: \{/p/header.frame_id: 'a'\}"),
     'sound': (sound, 'is sound whose messages do not tell the format; give a WAV file'),
     'a clock that is faster': (bag(3600.0, 0.5), r"topic '/p': the stamps differ .* and that changes by 2\.\d+ s"),
     'empty metadata': (both(bag(), emptied), HALVES),
     'several files without metadata': (
         both(bag(), bag(name='b_1'), without('b_1/b_1.mcap', 'b_1/b_2.mcap'), without('b_1/metadata.yaml')),
-        "'b_1' holds b_1.mcap, b_2.mcap without metadata.yaml",
+        "'b_1' is a folder .* it holds b_1.mcap, b_2.mcap without metadata.yaml",
     ),
     'SQLite without metadata': (
-        both(bag(), bag(name='b_1', plugin=StoragePlugin.SQLITE3), without('b_1/metadata.yaml')), "'b_1' holds b_1.db3",
+        both(bag(), bag(name='b_1', plugin=StoragePlugin.SQLITE3), without('b_1/metadata.yaml')), "b_1.db3 without",
     ),
     'a file that is not listed': (both(bag(), without('a_1/a_1.mcap', 'a_1/a_2.mcap')), r'a_2\.mcap is not listed'),
 }  # fmt: skip

@@ -13,7 +13,7 @@ import pytest
 import scipy.io
 from scipy.io import wavfile
 
-from texture_core.errors import InvalidData, MissingLibrary
+from texture_core.errors import InvalidData, MissingLibrary, UnknownName
 from texture_recordings.mapping import TableMapping, mapping_from, template_fields
 from texture_recordings.readers import MAPPED, Frame, chosen, frames
 from texture_recordings.tables import import_tables
@@ -111,9 +111,9 @@ def test_a_damaged_file_is_read_or_refused(tmp_path: Path, suffix: str) -> None:
 @each
 def test_a_column_that_is_missing_is_refused_with_the_nearest(tmp_path: Path, suffix: str) -> None:
     names = list(tables(made(tmp_path, suffix), EVERYTHING)[0].columns)
-    with pytest.raises(InvalidData, match="no column 'wrong'"):
-        chosen(['wrong'], names, 'a')
-    assert chosen(['*'], names, 'a') == names
+    with pytest.raises(UnknownName, match="no column 'wrong'"):
+        chosen(['wrong'], names)
+    assert chosen(['*'], names) == names
 
 
 @pytest.mark.parametrize(('suffix', 'name'), [('.h5', 'h5py'), ('.parquet', 'pyarrow.parquet')])

@@ -13,6 +13,7 @@ import re
 import struct
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import chain, islice
 from pathlib import Path
@@ -21,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from texture_core.config import MB, Arrays, library, open_regular, read_array, unknown_name
-from texture_core.errors import InvalidData, MissingLibrary
+from texture_core.errors import InvalidData, TextureError, UnknownName
 from texture_core.types import MAX_HZ, NANOSECONDS, AnyArray, Array
 from texture_recordings.bags import is_bag, message_types, read_foreign
 from texture_recordings.mapping import FileFormat, TableMapping, template_fields
@@ -54,7 +55,7 @@ class Frame:
     def __getitem__(self, name: str) -> AnyArray:
         """Return a column; UnknownName with the nearest if there is none."""
         if name not in self.columns:
-            raise InvalidData(f"'{self.place}': {unknown_name(name, self.columns, 'column')}")
+            raise unknown_name(name, self.columns, 'column')
         return self.columns[name]
 
     def numbers(self, name: str) -> Array:
@@ -63,7 +64,7 @@ class Frame:
         if array.dtype.kind in 'biuf':
             return np.where(np.isfinite(array), array, np.nan).astype(np.float64)
         if array.dtype.kind not in 'OUS':
-            raise InvalidData(f"'{self.place}': column '{name}' holds {array.dtype}; numbers are needed, name another")
+            raise InvalidData(f"column '{name}' holds {array.dtype}; numbers are needed, name another")
         return np.array([number_of(text) for text in self.texts(name).ravel().tolist()]).reshape(array.shape)
 
     def texts(self, name: str) -> AnyArray:
@@ -78,7 +79,7 @@ class Frame:
         return array if array.dtype.kind == 'O' else array.astype(str).astype(object)
 
 
-def chosen(wanted: Sequence[str], names: Sequence[str], place: str) -> list[str]:
+def chosen(wanted: Sequence[str], names: Sequence[str]) -> list[str]:
     """Return the columns that names, patterns such as 'taxel*' and ranges such as '0-8' mean, in their order."""
     found = []
     for name in wanted:
@@ -89,39 +90,50 @@ def chosen(wanted: Sequence[str], names: Sequence[str], place: str) -> list[str]
         elif name not in names and len(name) <= 100:
             meant = [one for one in names if one and fnmatch.fnmatchcase(one, name)] or [name]
         if unknown := [one for one in meant if one not in names]:
-            raise InvalidData(f"'{place}': {unknown_name(unknown[0], names, 'column')}")
+            raise unknown_name(unknown[0], names, 'column')
         found += meant
     return found
 
 
+@contextmanager
+def placed(place: str) -> Iterator[None]:
+    """Begin the sentence of what is refused within a `with` block with its place."""
+    try:
+        yield
+    except (InvalidData, UnknownName) as error:
+        sentence = str(error)
+        between = ' ' if sentence.startswith('it ') else ', ' if sentence.startswith('row ') else ': '
+        raise InvalidData(f"'{place}'{between}{sentence.removeprefix('it ')}") from error
+
+
 def frames(path: Path, place: str, mapping: TableMapping) -> Iterator[Frame]:
     """Yield the frames of a file; InvalidData with its place, whatever is wrong with it."""
-    kind = kind_of(path)
-    if kind in OTHER_KINDS:
-        raise InvalidData(f"'{place}' {OTHER_KINDS[kind]}")
-    try:
-        if path.is_dir():
-            size = sum(one.stat().st_size for one in path.iterdir() if one.is_file())
-        else:
-            with open_regular(path, MAX_FILE_BYTES) as file:
-                size = file.seek(0, io.SEEK_END)
-        taken, most = 0.0, max(MAX_VALUES, size)
+    with placed(place):
+        if kind_of(path) in OTHER_KINDS:
+            raise InvalidData(OTHER_KINDS[kind_of(path)])
+        try:
+            if path.is_dir():
+                size = sum(one.stat().st_size for one in path.iterdir() if one.is_file())
+            else:
+                with open_regular(path, MAX_FILE_BYTES) as file:
+                    size = file.seek(0, io.SEEK_END)
+            taken, most = 0.0, max(MAX_VALUES, size)
 
-        def take(count: float) -> None:
-            nonlocal taken
-            taken += count
-            if taken > most:
-                raise InvalidData(
-                    f"'{place}' declares more than {most / 1e6:.0f} million values in {size / MB:.3g} MB; at most that "
-                    'many are read, split it or save what the mapping needs'
-                )
+            def take(count: float) -> None:
+                nonlocal taken
+                taken += count
+                if taken > most:
+                    raise InvalidData(
+                        f'it declares more than {most / 1e6:.0f} million values in {size / MB:.3g} MB; at most that '
+                        'many are read, split it or save what the mapping needs'
+                    )
 
-        yield from READERS[kind](path, place, mapping, take)
-    except (InvalidData, MissingLibrary):
-        raise
-    except Exception as error:  # whatever a library raises, which depends on the byte that is wrong
-        reason = (str(error) or type(error).__name__)[:300]
-        raise InvalidData(f"'{place}' cannot be read: {reason}; save it again") from error
+            yield from READERS[kind_of(path)](path, place, mapping, take)
+        except TextureError:
+            raise
+        except Exception as error:  # whatever a library raises, which depends on the byte that is wrong
+            reason = (str(error) or type(error).__name__)[:300]
+            raise InvalidData(f'it cannot be read: {reason}; save it again') from error
 
 
 # ---- text files
@@ -147,8 +159,8 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
         first = next(rest, (0, ''))
         rest = rest if form.header else chain([first], rest)
         delimiter = form.delimiter or next((one for one in DELIMITERS if one in first[1]), ',')
-        names = _names(_cells(first[1], delimiter), form, place)
-        numbers = {name for one in mapping.streams.values() for name in chosen(one.columns, names, place)}
+        names = _names(_cells(first[1], delimiter), form)
+        numbers = {name for one in mapping.streams.values() for name in chosen(one.columns, names)}
         numbers |= {*mapping.numbers()}
         numeric: dict[str, bool] = {}
         for block in iter(lambda: list(islice(rest, BLOCK_ROWS)), []):
@@ -170,45 +182,45 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
                     if cells[row].lower() not in BLANK:
                         bad.setdefault(row, _reason(name, cells[row], form))
                 if not text:
-                    _refuse_commas(name, cells, form, delimiter, place)
+                    _refuse_commas(name, cells, form, delimiter)
                 part[name] = _texts(cells) if text else values
             for row in bad:
                 if {*rows[row]} & {*names}:
                     raise InvalidData(
-                        f"'{place}', row {block[row][0]}: the names of the columns come again, "
-                        f'{", ".join(rows[row][:5])}, so another recording may begin there; split the file there'
+                        f'row {block[row][0]}: the names of the columns come again, {", ".join(rows[row][:5])}, so '
+                        'another recording may begin there; split the file there'
                     )
             reasons += [f'row {block[row][0]}, {bad[row]}' for row in sorted(bad)[: EXAMPLES - len(reasons)]]
             lines.append(np.array([number for number, _ in block]))
             junk.append(np.isin(np.arange(len(rows)), list(bad)))
             parts.append(part)
     if not parts:
-        raise InvalidData(f"'{place}' has no rows below the names of its columns; choose files with samples")
+        raise InvalidData('it has no rows below the names of its columns; choose files with samples')
     columns = {name: np.concatenate([part[name] for part in parts]) for name in names}
     marked = np.concatenate(junk)
     for name in names:
         if columns[name].dtype.kind == 'O':  # no border is seen at a malformed row
-            last = np.maximum.accumulate(np.where(marked, 0, np.arange(len(marked))))
+            last = np.maximum.accumulate(np.where(marked, np.argmin(marked), np.arange(len(marked))))
             columns[name] = columns[name][last]
     yield Frame(place, columns, lines=np.concatenate(lines), junk=marked, reasons=reasons)
 
 
-def _names(cells: Sequence[str], form: FileFormat, place: str) -> list[str]:
+def _names(cells: Sequence[str], form: FileFormat) -> list[str]:
     """Return the names of the columns by the first row."""
     if not cells or '\0' in cells[0]:
-        raise InvalidData(f"'{place}' has no columns; give a text file in UTF-8 with a row for each sample")
+        raise InvalidData('it has no columns; give a text file in UTF-8 with a row for each sample')
     if len(cells) > MAX_CHANNELS:
-        raise InvalidData(f"'{place}' has {len(cells)} columns; at most {MAX_CHANNELS} are read, split it")
+        raise InvalidData(f'it has {len(cells)} columns; at most {MAX_CHANNELS} are read, split it')
     if not form.header:
         return [str(number) for number in range(len(cells))]
     twice = [name for name in cells if cells.count(name) > 1]
     if twice:
-        raise InvalidData(f"'{place}' has the column '{twice[0]}' twice; give each column a different name")
+        raise InvalidData(f"it has the column '{twice[0]}' twice; give each column a different name")
     values = np.array([number_of(name) for name in cells])
     counted = all(name.isdigit() for name in cells) and (np.diff(values) == 1).all()
     if np.isfinite(values).all() and not counted:
         raise InvalidData(
-            f"'{place}': the first row is {', '.join(cells[:3])[:60]}, which are numbers and no names; write "
+            f'the first row is {", ".join(cells[:3])[:60]}, which are numbers and no names; write '
             'format: {header: false}, or skip fewer rows'
         )
     return list(cells)
@@ -220,20 +232,19 @@ def _reason(name: str, cell: str, form: FileFormat) -> str:
     return f"column '{name}': '{cell[:40]}' is not a finite number{hint}"
 
 
-def _refuse_commas(name: str, cells: Sequence[str], form: FileFormat, delimiter: str, place: str) -> None:
+def _refuse_commas(name: str, cells: Sequence[str], form: FileFormat, delimiter: str) -> None:
     """Refuse commas that may be decimal as well as delimiters, or that separate thousands where they are decimal."""
     known = [cell for cell in cells if cell]
     padded = any(len(cell) > 1 and cell[0] == '0' for cell in known) and all(cell.isdigit() for cell in known)
     if delimiter == ',' and padded and known != sorted(known):
         raise InvalidData(
-            f"'{place}': the column '{name}' holds digits such as {known[0]}, so commas may be decimal as well as "
+            f"the column '{name}' holds digits such as {known[0]}, so commas may be decimal as well as "
             'between columns; save it with another delimiter'
         )
     commas = [cell for cell in cells if ',' in cell] if form.decimal == ',' else []
     if 0 < len(commas) < len(cells) and all(THOUSANDS.fullmatch(cell) for cell in commas):
         raise InvalidData(
-            f"'{place}', column '{name}': the comma of '{commas[0]}' seems to separate thousands; save numbers "
-            'without such commas'
+            f"column '{name}': the comma of '{commas[0]}' seems to separate thousands; save numbers without such commas"
         )
 
 
@@ -338,7 +349,7 @@ def _read_hdf5(path: Path, place: str, mapping: TableMapping, take: Take, *, mat
         def note(name: str, member: Any) -> None:
             """Keep a data set; the elements of references, as of cells and arrays of structs of MATLAB, from 1 on."""
             if len(found) > MAX_ARRAYS or name.count('/') > 20:
-                raise InvalidData(f"'{place}' has more than {MAX_ARRAYS} data sets, or circles of them; split it")
+                raise InvalidData(f'it has more than {MAX_ARRAYS} data sets, or circles of them; split it')
             if isinstance(member, h5py.Group):
                 for part, inner in member.items():
                     note(f'{name}/{part}', inner)
@@ -370,7 +381,7 @@ def _read_hdf5(path: Path, place: str, mapping: TableMapping, take: Take, *, mat
             if texts:
                 cells = np.asarray(member.asstr(errors='replace')[()], dtype=object)
                 return np.array([text[:MAX_TEXT] for text in cells.ravel()], dtype=object).reshape(cells.shape)
-            _refuse_hidden(member, f"'{place}': data set '{name}'")
+            _refuse_hidden(member, f"data set '{name}'")
             array = np.asarray(member[()])
             return array.T if matlab else array
 
@@ -394,10 +405,10 @@ def _read_wav(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
 
     with open_regular(path) as opened, warnings.catch_warnings():
         warnings.simplefilter('ignore')  # chunks that it does not know
-        _check_wav(opened, place)
+        _check_wav(opened)
         rate_hz, samples = wavfile.read(opened)
     if not 0 < rate_hz <= MAX_HZ:
-        raise InvalidData(f"'{place}' has a sampling rate of {rate_hz} Hz; above 0 and at most {MAX_HZ:g} is allowed")
+        raise InvalidData(f'it has a sampling rate of {rate_hz} Hz; above 0 and at most {MAX_HZ:g} is allowed')
     if samples.dtype.kind == 'u':
         samples = (samples.astype(np.float64) - 128.0) / 128.0
     elif samples.dtype.kind == 'i':
@@ -406,7 +417,7 @@ def _read_wav(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
         yield replace(frame, rate_hz=float(rate_hz))
 
 
-def _check_wav(file: Any, place: str) -> None:
+def _check_wav(file: Any) -> None:
     """Refuse a WAV file that was cut off or written to a pipe, or that holds several sounds."""
     size, sounds = file.seek(0, io.SEEK_END), 0
     file.seek(0)
@@ -416,12 +427,12 @@ def _check_wav(file: Any, place: str) -> None:
         sounds += name == b'data'
         if name == b'data' and length > size - file.tell():
             raise InvalidData(
-                f"'{place}' was cut off, or written to a pipe: it declares {length} bytes of sound and has "
+                f'it was cut off, or written to a pipe: it declares {length} bytes of sound and has '
                 f'{size - file.tell()}; copy or save it again'
             )
         file.seek(length + length % 2, io.SEEK_CUR)
     if sounds != 1:
-        raise InvalidData(f"'{place}' has {sounds} chunks of sound, one is needed; save it again as a plain WAV file")
+        raise InvalidData(f'it has {sounds} chunks of sound, one is needed; save it again as a plain WAV file')
     file.seek(0)
 
 
@@ -434,7 +445,7 @@ def _read_parquet(path: Path, place: str, mapping: TableMapping, take: Take) -> 
         opened.seek(0)
         file = parquet.ParquetFile(opened, read_dictionary=texts)  # each text once, however many rows have it
         if not file.metadata.num_rows:
-            raise InvalidData(f"'{place}' has no rows; choose files with samples")
+            raise InvalidData('it has no rows; choose files with samples')
         take(file.metadata.num_rows * len(schema))
         columns: dict[str, AnyArray] = {}
         for name, column in zip(schema.names, file.read(use_threads=False).columns, strict=True):
@@ -467,31 +478,29 @@ def _frames(
         if fields is not None:
             groups.setdefault(table, (fields, {}))[1][rest] = name
     if not groups:
-        raise InvalidData(
-            f"'{place}' has no array of the form '{mapping.tables}'; it has {', '.join(names[:5]) or 'none'}"
-        )
+        raise InvalidData(f"it has no array of the form '{mapping.tables}'; it has {', '.join(names[:5]) or 'none'}")
     for table, (fields, members) in sorted(groups.items()):
         within = f'{place}, {table}' if table else place
         arrays = {}
         for column, name in members.items():
             array = load(name)
             take(array.size * max(1.0, array.dtype.itemsize / 8))
-            arrays[column] = _arranged(array, mapping.format, within)
-        yield Frame(within, {**_unfolded(arrays, within), **{key: np.array(text) for key, text in fields.items()}})
+            arrays[column] = _arranged(array, mapping.format)
+        yield Frame(within, {**_unfolded(arrays), **{key: np.array(text) for key, text in fields.items()}})
 
 
-def _arranged(array: AnyArray, form: FileFormat, place: str) -> AnyArray:
+def _arranged(array: AnyArray, form: FileFormat) -> AnyArray:
     if form.reshape and array.ndim > 1:
         if array.size != math.prod(form.reshape):
             raise InvalidData(
-                f"'{place}': an array of the shape {array.shape} has {array.size} values and cannot be read as "
+                f'an array of the shape {array.shape} has {array.size} values and cannot be read as '
                 f'{form.reshape}; correct `reshape` under `format`'
             )
         array = array.reshape(form.reshape).transpose(form.axes).reshape(array.shape)
     return np.swapaxes(array, -1, -2) if form.transpose and array.ndim > 1 else array
 
 
-def _unfolded(arrays: Mapping[str, AnyArray], place: str) -> dict[str, AnyArray]:
+def _unfolded(arrays: Mapping[str, AnyArray]) -> dict[str, AnyArray]:
     """Return the columns of arrays, (n,) each, or () where there is one value."""
     columns: dict[str, AnyArray] = {}
     trials = next((array.shape[:2] for array in arrays.values() if array.ndim == 3), None)
@@ -509,7 +518,7 @@ def _unfolded(arrays: Mapping[str, AnyArray], place: str) -> dict[str, AnyArray]
             columns[name or '0'] = array.ravel()
         elif array.ndim not in (2, 3) or array.shape[-1] > MAX_CHANNELS:
             raise InvalidData(
-                f"'{place}': '{name}' has the shape {array.shape}; (n_samples, n_channels) is needed, at most "
+                f"'{name}' has the shape {array.shape}; (n_samples, n_channels) is needed, at most "
                 f'{MAX_CHANNELS} channels; see `transpose` under `format`'
             )
         else:
@@ -588,9 +597,9 @@ def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
     for message in read_foreign(path, is_wanted):
         name, msgtype = message.topic, message.msgtype
         if name not in types:
-            types[name] = _types_of(seen[name], place)
+            types[name] = _types_of(seen[name])
         before = rows.setdefault(name, [])
-        where = f"'{place}': message {len(before)} of '{name}'"
+        where = f"message {len(before)} of '{name}'"
         try:
             value = types[name].deserialize_cdr(message.data, msgtype)
             found = _rows_of(value, msgtype)
@@ -608,10 +617,10 @@ def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
         stamps.setdefault(name, []).append((stamp_ns or message.log_ns, message.log_ns))
     if not rows:
         raise InvalidData(
-            f"'{place}' has no topic that the mapping names ({', '.join(sorted(wanted))}); it has "
+            f'it has no topic that the mapping names ({", ".join(sorted(wanted))}); it has '
             f"{', '.join(sorted(seen)) or 'none'}; write columns as topic and field, such as '/wrench/wrench.force.x'"
         )
-    times_ns = _by_one_clock({name: np.array(pairs) for name, pairs in stamps.items()}, place)
+    times_ns = _by_one_clock({name: np.array(pairs) for name, pairs in stamps.items()})
     begin_ns = next(iter(times_ns.values()))[0]
     columns: dict[str, AnyArray] = {}
     clocks: dict[str, str] = {}
@@ -629,22 +638,20 @@ def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
     yield Frame(place, columns, clocks=clocks)
 
 
-def _types_of(connection: Any, place: str) -> Any:
+def _types_of(connection: Any) -> Any:
     """Return the types of the messages of a topic by the definition that the bag stores, or else that of ROS 2."""
     types, msgtype = message_types(connection), connection.msgtype
     if msgtype.startswith('audio_common_msgs/'):
-        raise InvalidData(
-            f"'{place}': '{connection.topic}' is sound whose messages do not tell the format; give a WAV file"
-        )
+        raise InvalidData(f"'{connection.topic}' is sound whose messages do not tell the format; give a WAV file")
     if msgtype not in types.types:
         raise InvalidData(
-            f"'{place}': the messages of '{connection.topic}' are {msgtype}, whose definition is neither in the bag "
+            f"the messages of '{connection.topic}' are {msgtype}, whose definition is neither in the bag "
             'nor of ROS 2 itself; record it as MCAP, which stores definitions, or republish it as a standard message'
         )
     return types
 
 
-def _by_one_clock(stamps: Mapping[str, AnyArray], place: str) -> dict[str, AnyArray]:
+def _by_one_clock(stamps: Mapping[str, AnyArray]) -> dict[str, AnyArray]:
     """Return the times of the messages of each topic, ns: as stamped, or by the recorder's clock if they have several.
 
     `stamps` are (n, 2), by the device and by the recorder.
@@ -657,7 +664,7 @@ def _by_one_clock(stamps: Mapping[str, AnyArray], place: str) -> dict[str, AnyAr
         low, high = np.percentile(values, (5, 95)).tolist()
         if high - low > OTHER_CLOCK_NS:
             raise InvalidData(
-                f"'{place}', topic '{name}': the stamps differ from the times of logging, which other topics have, by "
+                f"topic '{name}': the stamps differ from the times of logging, which other topics have, by "
                 f'{usual[name] / NANOSECONDS:.4g} s, and that changes by {(high - low) / NANOSECONDS:.3g} s; record '
                 'topics with stamps of one clock'
             )
@@ -680,7 +687,7 @@ READERS: Mapping[str, Callable[[Path, str, TableMapping, Take], Iterator[Frame]]
     '.parquet': _read_parquet,
     BAG: _read_bag,
 }
-OTHER_KINDS = {'.bag': 'is a bag of ROS 1; convert it: rosbags-convert --src FILE.bag --dst FOLDER'}
+OTHER_KINDS = {'.bag': 'it is a bag of ROS 1; convert it: rosbags-convert --src FILE.bag --dst FOLDER'}
 # Libraries that a kind of file needs: module, what it reads, and the extra of this package that brings it.
 HDF5 = ('h5py', 'HDF5 files', 'hdf5')
 PARQUET = ('pyarrow.parquet', 'Parquet files', 'parquet')

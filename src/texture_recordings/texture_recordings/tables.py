@@ -55,7 +55,7 @@ from texture_recordings.mapping import (
     TableMapping,
     template_fields,
 )
-from texture_recordings.readers import EXAMPLES, MAPPED, OTHER_KINDS, Frame, chosen, frames, kind_of, number_of
+from texture_recordings.readers import EXAMPLES, MAPPED, OTHER_KINDS, Frame, chosen, frames, kind_of, number_of, placed
 
 PLAUSIBLE_HZ, LIKELY_HZ = (5.0, 200_000.0), (20.0, 20_000.0)
 LONGEST_SLIDE_S = 1800.0
@@ -152,9 +152,10 @@ def import_tables(
         for path, place, fields in progress(_files(mapping, Path(source), kinds, report), 'import files'):
             constants = {name: np.array(text) for name, text in fields.items()}
             for frame in frames(path, place, mapping):
-                whole = replace(frame, columns={**frame.columns, **constants})
-                for slide in FrameSlides(mapping, whole, report).slides():
-                    bags.write(*slide)
+                with placed(frame.place):
+                    whole = replace(frame, columns={**frame.columns, **constants})
+                    for slide in FrameSlides(mapping, whole, report).slides():
+                        bags.write(*slide)
             if kind_of(path) == 'bag' and is_cut_off(path):
                 report.leave_out(
                     'bags were cut off, and end with their last whole part', 1, f"'{place}'; see mcap recover"
@@ -181,7 +182,16 @@ def _files(
         place = path.name if whole else path.relative_to(source).as_posix()
         fields = template_fields(mapping.files, place)
         if path.is_dir() and not is_bag(path):
-            _refuse_folder(path, place, fields is not None, kinds)
+            parts = [one.name for one in path.iterdir() if 'bag' in kinds and one.suffix in ('.mcap', '.db3')]
+            if fields is not None and (parts or path.suffix.lower() in kinds):
+                holds = (
+                    f'; it holds {", ".join(sorted(parts)[:3])} without metadata.yaml: ros2 bag reindex'
+                    if parts
+                    else ''
+                )
+                raise InvalidData(
+                    f"'{place}' is a folder and no file{holds}; move it elsewhere, or correct `files` in the mapping"
+                )
         elif fields is None or kind_of(path) not in (*kinds, *OTHER_KINDS):
             report.leave_out('files have other names or endings', 1, f"'{place}'")
         else:
@@ -192,17 +202,6 @@ def _files(
             f"no file in '{source}' has the form '{mapping.files}' and one of the endings {', '.join(kinds)}; "
             'give the folder that holds them, or correct `files` in the mapping'
         )
-
-
-def _refuse_folder(path: Path, place: str, meant: bool, kinds: Sequence[str]) -> None:
-    """Refuse a folder with the name of a file that is wanted, or with the parts of a bag that cannot be read."""
-    parts = sorted(one.name for one in path.iterdir() if 'bag' in kinds and one.suffix in ('.mcap', '.db3'))
-    if meant and parts:
-        raise InvalidData(
-            f"'{place}' holds {', '.join(parts[:3])} without metadata.yaml; write it anew: ros2 bag reindex"
-        )
-    if meant and path.suffix.lower() in kinds:
-        raise InvalidData(f"'{place}' is a folder and no file; move it elsewhere, or correct `files` in the mapping")
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,7 +234,7 @@ class FrameSlides:
         self._mapping, self._report, self._place = mapping, report, frame.place
         self._frame = self._wanted_rows(frame)
         names = [name for name, array in self._frame.columns.items() if array.ndim]
-        self._used = {name: chosen(one.columns, names, frame.place) for name, one in mapping.streams.items()}
+        self._used = {name: chosen(one.columns, names) for name, one in mapping.streams.items()}
         self._texts = {name: self._frame.texts(name) for name in mapping.texts()}
         numbers = [*(column for columns in self._used.values() for column in columns), *mapping.numbers()]
         self._numbers = {name: self._frame.numbers(name) for name in numbers}
@@ -253,9 +252,7 @@ class FrameSlides:
         rates = {one.name: one.rate_hz for one in self._streams if one.time_s is None and one.group == reference.group}
         if rates and max(rates.values()) > SAME_RATE * min(rates.values()):
             stated = ', '.join(f"{rate_hz:.4g} by '{name}'" for name, rate_hz in rates.items())
-            raise InvalidData(
-                f"'{self._place}': rows per second are {stated}, which share their rows; correct `rate_hz`"
-            )
+            raise InvalidData(f'rows per second are {stated}, which share their rows; correct `rate_hz`')
 
     def slides(self) -> Iterator[tuple[str, ExplorationState, SlideStreams, Conditions]]:
         """Yield what `SlideBags.write` takes."""
@@ -272,8 +269,8 @@ class FrameSlides:
             yield self._slide(times, span, number)
         if short > MAX_LEFT_OUT * inside and short < inside and params.min_s == SlideBorders().min_s:
             raise InvalidData(
-                f"'{self._place}': {short} of {inside} rows lie in slides that are shorter than {params.min_s:g} s; "
-                'look at `slides` in the mapping, or set another `min_s` there'
+                f'{short} of {inside} rows lie in slides that are shorter than {params.min_s:g} s; look at `slides` in '
+                'the mapping, or set another `min_s` there'
             )
 
     # ---- rows and streams
@@ -282,11 +279,11 @@ class FrameSlides:
         for name, value in self._mapping.rows.items():
             texts = frame.texts(name)
             if not texts.ndim:
-                raise InvalidData(f"'{self._place}': '{name}' under `rows` holds for the whole file; name a column")
+                raise InvalidData(f"'{name}' under `rows` holds for the whole file; name a column")
             mask = np.array([_is_one_of(text, [value]) for text in texts])
             if not mask.any():
                 has = ', '.join(sorted({*texts.tolist()})[:5])
-                raise InvalidData(f"'{self._place}': column '{name}' has no row '{value}'; it has {has}")
+                raise InvalidData(f"column '{name}' has no row '{value}'; it has {has}")
             self._report.leave_out('rows are not those under `rows`', int((~mask).sum()))
             lines = np.arange(len(mask)) if frame.lines is None else frame.lines
             frame = replace(
@@ -307,21 +304,17 @@ class FrameSlides:
         names, per_row = self._used[name], params.samples_per_row or 1
         group = self._group(names[0])
         if lengths := {self._group(column)[1] for column in names} - {group[1]}:
-            raise InvalidData(
-                f"'{self._place}': the columns of '{name}' have {group[1]} and {min(lengths)} rows; put columns of "
-                'different rates into two streams'
-            )
+            unlike = f'{group[1]} and {min(lengths)} rows'
+            raise InvalidData(f"the columns of '{name}' have {unlike}; put columns of different rates into two streams")
         channels = tuple(params.channels) or tuple(names[::per_row])
         if len(channels) * per_row != len(names):
             raise InvalidData(
-                f"'{self._place}': the stream '{name}' has {len(names)} columns for {len(channels)} channels of "
+                f"the stream '{name}' has {len(names)} columns for {len(channels)} channels of "
                 f'samples_per_row: {per_row}; give a name for each channel, and the number of its columns in a row'
             )
         if len(self._report.channels.setdefault(name, channels)) != len(channels):
-            raise InvalidData(
-                f"'{self._place}': '{name}' has {len(channels)} channels, {len(self._report.channels[name])} in the "
-                'files before; give each sensor a mapping'
-            )
+            before = len(self._report.channels[name])
+            raise InvalidData(f"'{name}' has {len(channels)} channels, {before} before; give each sensor a mapping")
         self._check_groups(name, params.samples_per_row, group[1])
         with np.errstate(over='ignore'):
             values = [np.atleast_1d(self._numbers[column] * params.scale).astype(np.float32) for column in names]
@@ -338,7 +331,7 @@ class FrameSlides:
         if clock:
             raw = self._frame.numbers(clock)
             if raw.size != len(samples):
-                raise InvalidData(f"'{self._place}': column '{clock}' has {raw.size} rows, '{name}' {len(samples)}")
+                raise InvalidData(f"column '{clock}' has {raw.size} rows, '{name}' {len(samples)}")
             bad |= np.isnan(raw)
             raw = with_malformed(raw, kept) * TIME_UNITS[params.time.unit if params.time.column else 's']
             kept &= np.isfinite(raw)
@@ -358,14 +351,14 @@ class FrameSlides:
         together = max(after - before for before, after in pairwise(breaks))
         if not count and together > MAX_NUMBERED:
             raise InvalidData(
-                f"'{self._place}': the stream '{name}' has {len(names)} columns, {names[0]} … {names[-1]}, and {rows} "
+                f"the stream '{name}' has {len(names)} columns, {names[0]} … {names[-1]}, and {rows} "
                 f'rows; write samples_per_row: {together} if a row holds that many consecutive samples of one channel '
                 '(slides: {by: row} if it is a window), samples_per_row: 1 if the columns are channels, or '
                 'format: {transpose: true} if the array lies on its side'
             )
         if count and all(parts) and any((at + 1) % count for at in breaks[1:-1]):
             raise InvalidData(
-                f"'{self._place}': the columns of '{name}' are {', '.join(names[:4])} …, whose numbers do not count up "
+                f"the columns of '{name}' are {', '.join(names[:4])} …, whose numbers do not count up "
                 f"within {count} columns; write them in the order of the samples, such as a range 'name_0-{count - 1}'"
             )
 
@@ -383,8 +376,8 @@ class FrameSlides:
         except ClockFault as fault:
             raise self._fault(clock, rows[fault.row], fault) from fault
 
-    def _fault(self, clock: str, row: int, reason: object) -> InvalidData:
-        return InvalidData(f"'{self._place}', row {self._line(row)}, column '{clock}': {reason}")
+    def _fault(self, column: str, row: int, reason: object) -> InvalidData:
+        return InvalidData(f"row {self._line(row)}, column '{column}': {reason}")
 
     def _check_malformed(self) -> None:
         """Count the malformed rows of the streams; InvalidData if they are too many."""
@@ -396,7 +389,7 @@ class FrameSlides:
             self._report.leave_out('malformed rows', count, *(f"'{self._place}', {reason}" for reason in reasons))
             if not length or count > MAX_LEFT_OUT * length:
                 raise InvalidData(
-                    f"'{self._place}' has {count} malformed rows of {length}, first {reasons[0]}; at most "
+                    f'it has {count} malformed rows of {length}, first {reasons[0]}; at most '
                     f'{100 * MAX_LEFT_OUT:g} % are taken; look at the columns and at `format` in the mapping'
                 )
 
@@ -424,12 +417,10 @@ class FrameSlides:
         if wanted is not None:
             spans = [one for one in spans if _is_one_of(wanted[one.start], params.values or ['?*'])]
             if not spans:
-                raise InvalidData(
-                    f"'{self._place}': column '{params.column}' has none of the values "
-                    f'{", ".join(params.values) or "but empty"}; it has {", ".join(sorted({*wanted.tolist()})[:5])}'
-                )
+                values, has = ', '.join(params.values) or 'but empty', ', '.join(sorted({*wanted.tolist()})[:5])
+                raise InvalidData(f"column '{params.column}' has none of the values {values}; it has {has}")
         if len(spans) > MAX_SLIDES:
-            raise InvalidData(f"'{self._place}' has more than {MAX_SLIDES} slides; split it")
+            raise InvalidData(f'it has more than {MAX_SLIDES} slides; split it')
         return spans
 
     def _refuse_unused_codes(self) -> None:
@@ -450,12 +441,12 @@ class FrameSlides:
                 rows = rows[self._frame.texts(name)[rows] != ''] if text else rows
                 if row := _mixed(codes[rows], text=text):
                     first, other = self._frame.texts(name)[rows[row - 1 : row + 1]]
-                    raise InvalidData(
-                        f"'{self._place}', row {self._line(rows[row])}: the unused column '{name}' changes from "
-                        f"'{first}' to '{other}' within a slide, so rows of several sensors, trials or runs may be "
-                        f"mixed; choose some by rows: {{{name}: '{first}'}}, cut there by slides: {{by: column, "
-                        f"column: {name}}}, or take all as one signal by rows: {{{name}: '*'}}"
-                    )
+                    raise self._fault(
+                        name, rows[row], f"it changes from '{first}' to '{other}' within a slide and no key uses it: "
+                        f'rows of several sensors, trials or runs may be mixed; choose some by rows: {{{name}: '
+                        f"'{first}'}}, cut there by slides: {{by: column, column: {name}}}, or take all as one signal "
+                        f"by rows: {{{name}: '*'}}"
+                    )  # fmt: skip
 
     def _rated(self, stream: Stream) -> Stream:
         """Return a stream with the rate of its rows: as stated, else by its times, which must agree."""
@@ -471,14 +462,14 @@ class FrameSlides:
             measured = per_row * estimated_rate_hz(steps, burst_s)
             if not measured:
                 raise InvalidData(
-                    f"'{self._place}': the times of '{name}' do not grow from row to row; give a column of time that "
+                    f"the times of '{name}' do not grow from row to row; give a column of time that "
                     'grows and has enough digits, or `rate_hz` in its place'
                 )
         # Of the first file: windows of all are to have as many samples.
         rate_hz = self._report.rates_hz.get(name) or params.rate_hz or measured
         if measured and not 1 / SAME_RATE <= measured / rate_hz <= SAME_RATE:
             raise InvalidData(
-                f"'{self._place}': '{name}' has {measured:g} Hz by its times, {rate_hz:g} Hz are expected; look at the "
+                f"'{name}' has {measured:g} Hz by its times, {rate_hz:g} Hz are expected; look at the "
                 f"unit of column '{stream.clock}' and at `rate_hz` in the mapping"
             )
         low, high = (MIN_HZ, MAX_HZ) if params.rate_hz else PLAUSIBLE_HZ
@@ -487,7 +478,7 @@ class FrameSlides:
             likely = [one for one, other_hz in of_unit.items() if LIKELY_HZ[0] <= other_hz <= LIKELY_HZ[1]]
             hint = f'; with unit: {likely[0]} it were {of_unit[likely[0]]:g} Hz' if likely else ''
             raise InvalidData(
-                f"'{self._place}': the rate of '{name}' is {rate_hz:g} Hz by its times{hint}; give a column of time "
+                f"the rate of '{name}' is {rate_hz:g} Hz by its times{hint}; give a column of time "
                 f'that grows and its unit, or `rate_hz`, from {low:g} to {high:g}'
             )
         self._report.rates_hz[name] = rate_hz
@@ -506,10 +497,7 @@ class FrameSlides:
             return values[reference.rows]
         clock = self._frame.clocks.get(name)
         if clock is None or reference.time_s is None:
-            raise InvalidData(
-                f"'{self._place}': column '{name}' has {len(values)} rows, as no stream has; name one of the same "
-                'length'
-            )
+            raise InvalidData(f"column '{name}' has {len(values)} rows, as no stream; name one of the same length")
         held = np.searchsorted(self._frame[clock], reference.time_s + SAME_TIME_S, 'right') - 1
         return np.where(held >= 0, values[np.maximum(held, 0)], '' if columns is self._texts else math.nan)
 
@@ -519,27 +507,26 @@ class FrameSlides:
         held = texts[np.maximum.accumulate(np.where(texts != '', np.arange(len(texts)), 0))][rows]
         known = np.flatnonzero(held != '')
         if not len(known):
-            raise InvalidData(f"'{self._place}': column '{name}' has no value during a slide; name another")
+            raise InvalidData(f"column '{name}' has no value during a slide; name another")
         first = str(held[known[0]])
         other = known[held[known] != first]
         if len(other):
-            raise InvalidData(
-                f"'{self._place}', row {self._line(self._reference.rows[rows.start + other[0]])}, column '{name}': the "
-                f"{kind} changes from '{first}' to '{held[other[0]]}' within a slide; let slides end where '{name}' "
-                'changes (`slides: {by: column}`)'
-            )
+            raise self._fault(
+                name, self._reference.rows[rows.start + other[0]], f"the {kind} changes from '{first}' to "
+                f"'{held[other[0]]}' within a slide; let slides end where '{name}' changes (`slides: {{by: column}}`)"
+            )  # fmt: skip
         return first
 
     def _slide(self, times: Array, rows: slice, number: int) -> tuple[str, ExplorationState, SlideStreams, Conditions]:
         label, reference = self._mapping.label, self._reference
         surface = checked_label(self._named(label.value or self._value(label.column, rows, 'label')))
         if not surface:
-            raise InvalidData(f"'{self._place}': a slide has an empty label; name another column under `label`")
+            raise InvalidData('a slide has an empty label; name another column under `label`')
         session = self._value(self._mapping.session, rows, 'session') if self._mapping.session else surface
         begin_s, end_s = float(times[rows].min()), float(times[rows].max()) + 1.0 / reference.rate_hz
         if end_s - begin_s > LONGEST_SLIDE_S:
             raise InvalidData(
-                f"'{self._place}', row {self._line(reference.rows[rows.start])}: a slide lasts {end_s - begin_s:.4g} "
+                f'row {self._line(reference.rows[rows.start])}: a slide lasts {end_s - begin_s:.4g} '
                 f's, at most {LONGEST_SLIDE_S:g} s are plausible; look at the column of time, its unit and `slides`'
             )
         streams = {one.name: self._samples(one, surface, self._frame_rows(rows), begin_s, end_s)
@@ -560,7 +547,7 @@ class FrameSlides:
         same = [code] if code in names else [one for one in names if number_of(one) == number]
         if not same and names and math.isfinite(number) and all(math.isfinite(number_of(one)) for one in names):
             raise InvalidData(
-                f"'{self._place}': the label {code} has no name; it is none of {', '.join(names)} under `names`; add "
+                f'the label {code} has no name; it is none of {", ".join(names)} under `names`; add '
                 'it, or leave its rows out by `values` under `slides`'
             )
         return names[same[0]] if same else code
@@ -576,10 +563,8 @@ class FrameSlides:
             first, last = np.searchsorted(at, (begin_s - SAME_TIME_S, end_s - SAME_TIME_S))
         samples = stream.samples[first:last]
         if not len(samples):
-            raise InvalidData(
-                f"'{self._place}' has no samples of '{stream.name}' from {begin_s:g} to {end_s:g} s of a slide; "
-                'look at the times of the streams'
-            )
+            span = f'{begin_s:g} to {end_s:g} s'
+            raise InvalidData(f"no samples of '{stream.name}' from {span} of a slide; look at the times of the streams")
         rows: AnyArray = np.arange(len(samples))
         index, counts = rows, Counter(samples=len(samples))
         if stream.time_s is not None and len(samples) > 1:
@@ -611,7 +596,7 @@ class FrameSlides:
         number = value / units[given]
         likely = [unit for unit, factor in units.items() if low <= number * factor <= high]
         raise InvalidData(
-            f"'{self._place}': the {name} of a slide is {number:.4g} {given}, plausible are "
+            f'the {name} of a slide is {number:.4g} {given}, plausible are '
             f'{low / units[given]:.3g} to {high / units[given]:.3g} {given}; look at its unit in the mapping'
             + (f', which may be {" or ".join(likely)}' if likely else '')
         )
@@ -632,9 +617,7 @@ class FrameSlides:
             values = self._aligned(self._numbers, quantity.column)[rows]
             text = str(self._frame[quantity.column][()])
             if not self._frame[quantity.column].ndim and text != 'nan' and not np.isfinite(values).all():
-                raise InvalidData(
-                    f"'{self._place}': '{quantity.column}' is '{text}' in its name; a number is needed there"
-                )
+                raise InvalidData(f"'{quantity.column}' is '{text}' in its name; a number is needed there")
         else:
             values = np.full(rows.stop - rows.start, float(quantity.value or 'nan'))
         times, values = times[rows][np.isfinite(values)], values[np.isfinite(values)]
