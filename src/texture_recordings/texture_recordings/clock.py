@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -35,7 +36,7 @@ class ClockFault(ValueError):
         self.row = row
 
 
-def period_of(times: Array, periods: tuple[float, ...] = PERIODS) -> float:
+def _period_s(times: Array, periods: Sequence[float]) -> float:
     """Return the period of a clock that rolls over, s; 0 if its steps back are none of a roll."""
     steps = np.diff(times)
     back, forward = steps[steps < 0], steps[steps > 0]
@@ -50,18 +51,20 @@ def period_of(times: Array, periods: tuple[float, ...] = PERIODS) -> float:
     return 0.0
 
 
-def unwrapped(times: Array) -> Array:
-    """Return times of a counter or of the day without its rolls; ClockFault where rolls hide losses."""
-    period = period_of(times)
-    if 0 < period < SHORTEST_PERIOD_S:
+def forward(times: Array, *, runs: bool) -> Array:
+    """Return times of a counter or of the day without its rolls; ClockFault where these hide losses, or may be runs."""
+    period_s = _period_s(times, (*PERIODS, *(MINUTE_AND_HOUR if runs else ())))
+    if period_s and (runs or period_s < SHORTEST_PERIOD_S):
+        hidden = f'lost samples and a slower rate cannot be seen; {WITHOUT_TIME}'
+        other = 'a run that is another slide looks alike; cut the slides by a column, or save times that grow'
         raise ClockFault(
-            int(np.argmax(np.diff(times) < 0)) + 1, f'the clock rolls over every {period:.3g} s, in which lost samples '
-            f'and a slower rate cannot be seen; {WITHOUT_TIME}',
-        )  # fmt: skip
-    return np.asarray(np.unwrap(times, period=period)) if period else times
+            int(np.argmax(np.diff(times) < 0)) + 1,
+            f'the clock rolls over every {period_s:.3g} s, in which {other if runs else hidden}',
+        )
+    return np.asarray(np.unwrap(times, period=period_s)) if period_s else times
 
 
-def burst_step_s(steps: Array) -> float:
+def _burst_step_s(steps: Array) -> float:
     """Return the least step between bursts of rows that a buffer stamped at once; 0 where steps are not bimodal."""
     steps = steps[steps >= 0]
     large = steps[steps > steps.mean()] if len(steps) else steps
@@ -72,9 +75,12 @@ def burst_step_s(steps: Array) -> float:
     return float(large.min()) if regular and within < BURST_DUTY else 0.0
 
 
-def estimated_rate_hz(steps: Array, burst_s: float) -> float:
-    """Return the rate of rows in spite of jitter and gaps, of four digits; 0 without steps of time."""
-    size = 1.0
+def estimated(steps: Array) -> tuple[float, float]:
+    """Return the rate of rows in spite of jitter and gaps, of four digits, and the least step between bursts, s.
+
+    Both are 0 without such.
+    """
+    burst_s, size = _burst_step_s(steps), 1.0
     if burst_s:  # the steps from burst to burst
         ends = np.flatnonzero(steps >= burst_s)
         size = float(np.median(np.diff(ends)))
@@ -83,10 +89,11 @@ def estimated_rate_hz(steps: Array, burst_s: float) -> float:
     # Without gaps and rows that are there twice.
     usual = steps[(steps < 1.75 * np.median(steps)) & (steps > 0.25 * np.median(steps))] if len(steps) else steps
     if not len(usual):
-        return 0.0
+        return 0.0, burst_s
     rate_hz = float(size / usual.mean())
     simple = float(f'{rate_hz:.2g}')
-    return simple if abs(rate_hz / simple - 1.0) < ROUND_RATE else float(f'{rate_hz:.{SIGNIFICANT}g}')
+    near = abs(rate_hz / simple - 1.0) < ROUND_RATE
+    return simple if near else float(f'{rate_hz:.{SIGNIFICANT}g}'), burst_s
 
 
 def on_grid(
@@ -98,7 +105,6 @@ def on_grid(
     """
     count, steps = len(times), np.diff(times)
     left: Counter[str] = Counter()
-    index: AnyArray
     rows: AnyArray = np.arange(count)
     # Rows that are there once more are none; those of a buffer have one time, and may have one value.
     if not burst_s and (steps <= 0).any():
@@ -119,7 +125,7 @@ def on_grid(
             f'a counter is only unwrapped at 2^16, 2^24, 2^31 or 2^32; {WITHOUT_TIME}',
         )  # fmt: skip
     if burst_s:
-        rows, index = _burst_places(times, samples, rate_hz, burst_s, stated=stated)
+        rows = index = _in_bursts(times, samples, burst_s)
         left['rows of incomplete bursts'] = count - len(rows)
     else:
         index = _places(times[rows], rows, rate_hz, out, stated=stated)
@@ -132,14 +138,14 @@ def on_grid(
         rows, index = rows[low:high], index[low:high]
     if count - len(rows) > MAX_LEFT_OUT * count:
         raise ClockFault(
-            int(rows[0]), f'{count - len(rows)} of {count} rows have the time of another one or come in incomplete '
-            f'bursts; filter them (`rows: {{column: value}}`); {WITHOUT_TIME}',
+            0, f'{count - len(rows)} of {count} rows have the time of another one or come in incomplete bursts; filter '
+            f'them (`rows: {{column: value}}`); {WITHOUT_TIME}',
         )  # fmt: skip
-    lost, seconds = int(index[-1] - index[0] + 1 - len(index)), float(times[rows[-1]] - times[rows[0]])
+    lost = int(index[-1] - index[0] + 1 - len(index))
     if lost > len(rows):
         raise ClockFault(
             0, f'{len(rows)} rows and {lost} lost samples at {rate_hz:g} Hz: more are lost than there are; by rows and '
-            f'duration the rate is {len(rows) / max(seconds, 1e-9):.4g} Hz; look at the column of time and its unit; '
+            f'duration the rate is {_mean_hz(times[rows]):.4g} Hz; look at the column of time and its unit; '
             f'{WITHOUT_TIME}',
         )  # fmt: skip
     return rows, index - index[0], Counter({'samples': len(index), 'lost': lost}) + left
@@ -158,7 +164,6 @@ def _places(times: Array, rows: AnyArray, rate_hz: float, out: int, *, stated: b
     pairs = np.minimum(steps + np.append(steps[1:], np.inf), steps + np.append(np.inf, steps[:-1])[: len(steps)])
     missing = np.where((steps > GAP) & (pairs > 1.0 + GAP), np.rint(steps) - 1, 0).astype(np.int64)
     index = np.concatenate(([0], np.cumsum(1 + missing)))
-    mean_hz = len(times) / max(times[-1] - times[0], 1e-9)
     # Where the clock counts in steps of about an interval, its rounding looks like losses.
     tick_s = _tick_s(times)
     exact = stated and np.abs(steps - np.rint(steps)).max(initial=0.0) < 0.02
@@ -173,7 +178,7 @@ def _places(times: Array, rows: AnyArray, rate_hz: float, out: int, *, stated: b
         raise ClockFault(
             int(rows[lag.argmax()]), f'the steps of time are too irregular for a rate of {rate_hz:g} Hz: this row is '
             f'{lag.max():.2g} samples off the grid, so losses cannot be told from jitter, and by rows and duration the '
-            f'rate is {mean_hz:.4g} Hz; {WITHOUT_TIME}',
+            f'rate is {_mean_hz(times):.4g} Hz; {WITHOUT_TIME}',
         )  # fmt: skip
     if lag.max() > MOST_OFF + MOST_OFF_SHARE * len(index):
         raise ClockFault(
@@ -183,26 +188,26 @@ def _places(times: Array, rows: AnyArray, rate_hz: float, out: int, *, stated: b
     return index
 
 
-def _burst_places(
-    times: Array, samples: AnyArray, rate_hz: float, burst_s: float, *, stated: bool
-) -> tuple[AnyArray, AnyArray]:
-    """Return which rows are in whole bursts, and the place of each on the grid, (n,) each."""
+def _in_bursts(times: Array, samples: AnyArray, burst_s: float) -> AnyArray:
+    """Return the rows of whole bursts, (n,): of one size and an even distance, one comes after the other."""
     inside = np.diff(times) < burst_s
     starts = np.flatnonzero(np.append(True, ~inside))
     counts = np.diff(np.append(starts, len(times)))
     if np.all(samples[1:] == samples[:-1], axis=1)[inside].mean() > 0.5 and np.any(samples != samples[0]):
         raise ClockFault(1, 'most rows are there twice, with one time and the same values; save each row once')
     # Nobody knows which row a burst of another size lacks; a slide may begin and end within one.
-    size = int(np.median(counts))
-    if (counts[1:-1] != size).any() or size not in counts:
+    size, steps = int(np.median(counts)), np.diff(times[starts[1:]])
+    if (counts[1:-1] != size).any() or (steps > GAP * np.median(steps)).any():
         raise ClockFault(
-            0, f'rows come in bursts of {counts.min()} to {counts.max()}, so lost rows cannot be told; by rows and '
-            f'duration the rate is {len(times) / max(times[-1] - times[0], 1e-9):.4g} Hz; {WITHOUT_TIME}',
+            0, f'rows come in bursts of {counts.min()} to {counts.max()}, every {steps.min():.3g} to {steps.max():.3g} '
+            f's, so lost rows cannot be told; by rows and duration the rate is {_mean_hz(times):.4g} Hz; '
+            f'{WITHOUT_TIME}',
         )  # fmt: skip
-    whole = starts[counts == size]
-    index = _places(times[whole], whole, rate_hz / size, 0, stated=stated)
-    within = np.arange(size)
-    return np.add.outer(whole, within).ravel(), np.add.outer(size * index, within).ravel()
+    return np.flatnonzero(np.repeat(counts == size, counts))
+
+
+def _mean_hz(times: Array) -> float:
+    return float(len(times) / max(times[-1] - times[0], 1e-9))
 
 
 def _rest(times: Array, numbers: AnyArray) -> Array:

@@ -21,41 +21,20 @@ import numpy as np
 
 from texture_core.cli import progress
 from texture_core.errors import InvalidData
-from texture_core.types import (
-    MAX_HZ,
-    MIN_HZ,
-    NANOSECONDS,
-    AnyArray,
-    Array,
-    ExplorationState,
-    Phase,
-    TactileSignal,
-    checked_label,
-)
+from texture_core.types import NANOSECONDS, AnyArray, Array, ExplorationState, Phase, TactileSignal, checked_label
 from texture_recordings.bags import DELAY_NS, PAUSE_NS, START_NS, BagWriter, is_bag, is_cut_off, slide_batches
-from texture_recordings.clock import (
-    MAX_LEFT_OUT,
-    MINUTE_AND_HOUR,
-    PERIODS,
-    SAME_RATE,
-    ClockFault,
-    burst_step_s,
-    estimated_rate_hz,
-    on_grid,
-    period_of,
-    unwrapped,
-    with_malformed,
-)
+from texture_recordings.clock import MAX_LEFT_OUT, SAME_RATE, ClockFault, estimated, forward, on_grid, with_malformed
 from texture_recordings.mapping import (
+    CONDITION_COLUMNS,
     CONDITION_UNITS,
     TIME_UNITS,
     Quantity,
-    SlideBorders,
     StreamColumns,
     TableMapping,
     template_fields,
 )
 from texture_recordings.readers import EXAMPLES, MAPPED, OTHER_KINDS, Frame, chosen, frames, kind_of, number_of, placed
+from texture_recordings.slides import STATES
 
 PLAUSIBLE_HZ, LIKELY_HZ = (5.0, 200_000.0), (20.0, 20_000.0)
 LONGEST_SLIDE_S = 1800.0
@@ -223,8 +202,6 @@ class Stream:
 
 # By topic: a stream, and of one slide its samples and their places on the grid.
 SlideStreams = Mapping[str, tuple[Stream, AnyArray, AnyArray]]
-# What holds from a time since the start of a slide on, in SI units, NaN if unknown: time, speed, force, direction.
-Conditions = Sequence[tuple[float, ...]]
 
 
 class FrameSlides:
@@ -254,7 +231,7 @@ class FrameSlides:
             stated = ', '.join(f"{rate_hz:.4g} by '{name}'" for name, rate_hz in rates.items())
             raise InvalidData(f'rows per second are {stated}, which share their rows; correct `rate_hz`')
 
-    def slides(self) -> Iterator[tuple[str, ExplorationState, SlideStreams, Conditions]]:
+    def slides(self) -> Iterator[tuple[str, list[ExplorationState], SlideStreams]]:
         """Yield what `SlideBags.write` takes."""
         params, reference, short, inside = self._mapping.slides, self._reference, 0, 0
         times = reference.rows / reference.rate_hz if reference.time_s is None else reference.time_s
@@ -267,7 +244,7 @@ class FrameSlides:
                 self._report.leave_out('slides are too short', 1, where)
                 continue
             yield self._slide(times, span, number)
-        if short > MAX_LEFT_OUT * inside and short < inside and params.min_s == SlideBorders().min_s:
+        if short > MAX_LEFT_OUT * inside and short < inside and params.min_s == type(params).min_s:
             raise InvalidData(
                 f'{short} of {inside} rows lie in slides that are shorter than {params.min_s:g} s; look at `slides` in '
                 'the mapping, or set another `min_s` there'
@@ -335,7 +312,10 @@ class FrameSlides:
             bad |= np.isnan(raw)
             raw = with_malformed(raw, kept) * TIME_UNITS[params.time.unit if params.time.column else 's']
             kept &= np.isfinite(raw)
-            time_s = self._forward(raw[kept], np.flatnonzero(kept), clock)
+            try:
+                time_s = forward(raw[kept], runs=self._mapping.slides.by == 'pause')
+            except ClockFault as fault:
+                raise self._fault(clock, np.flatnonzero(kept)[fault.row], fault) from fault
         elif not bad.all():  # malformed rows above the samples and below them are none
             kept[: int(np.argmin(bad))] = kept[len(bad) - int(np.argmin(bad[::-1])) :] = False
         self._malformed[len(bad)] = self._malformed.get(len(bad), False) | bad
@@ -361,20 +341,6 @@ class FrameSlides:
                 f"the columns of '{name}' are {', '.join(names[:4])} …, whose numbers do not count up "
                 f"within {count} columns; write them in the order of the samples, such as a range 'name_0-{count - 1}'"
             )
-
-    def _forward(self, times: Array, rows: AnyArray, clock: str) -> Array:
-        """Return times without the rolls of a counter; where pauses end slides a roll may be another run."""
-        back = int(np.argmax(np.diff(times, append=math.inf) < 0)) + 1
-        try:
-            period = period_of(times, (*PERIODS, *MINUTE_AND_HOUR)) if self._mapping.slides.by == 'pause' else 0.0
-            if period:
-                raise ClockFault(
-                    back, f'time goes back as a clock that rolls over every {period:.4g} s does, or as another run; '
-                    'cut the slides by a column, or save times that grow',
-                )  # fmt: skip
-            return unwrapped(times)
-        except ClockFault as fault:
-            raise self._fault(clock, rows[fault.row], fault) from fault
 
     def _fault(self, column: str, row: int, reason: object) -> InvalidData:
         return InvalidData(f"row {self._line(row)}, column '{column}': {reason}")
@@ -458,8 +424,8 @@ class FrameSlides:
                 edges = [row for span in self._spans for row in self._frame_rows(span)]
                 slide = np.searchsorted(edges, stream.rows, 'right')
                 steps = steps[slide[1:] == slide[:-1]]
-            burst_s = burst_step_s(steps)
-            measured = per_row * estimated_rate_hz(steps, burst_s)
+            measured, burst_s = estimated(steps)
+            measured *= per_row
             if not measured:
                 raise InvalidData(
                     f"the times of '{name}' do not grow from row to row; give a column of time that "
@@ -472,8 +438,8 @@ class FrameSlides:
                 f"'{name}' has {measured:g} Hz by its times, {rate_hz:g} Hz are expected; look at the "
                 f"unit of column '{stream.clock}' and at `rate_hz` in the mapping"
             )
-        low, high = (MIN_HZ, MAX_HZ) if params.rate_hz else PLAUSIBLE_HZ
-        if not low <= rate_hz <= high:
+        low, high = PLAUSIBLE_HZ
+        if not params.rate_hz and not low <= rate_hz <= high:
             of_unit = {one: rate_hz * TIME_UNITS[params.time.unit] / factor for one, factor in TIME_UNITS.items()}
             likely = [one for one, other_hz in of_unit.items() if LIKELY_HZ[0] <= other_hz <= LIKELY_HZ[1]]
             hint = f'; with unit: {likely[0]} it were {of_unit[likely[0]]:g} Hz' if likely else ''
@@ -517,7 +483,7 @@ class FrameSlides:
             )  # fmt: skip
         return first
 
-    def _slide(self, times: Array, rows: slice, number: int) -> tuple[str, ExplorationState, SlideStreams, Conditions]:
+    def _slide(self, times: Array, rows: slice, number: int) -> tuple[str, list[ExplorationState], SlideStreams]:
         label, reference = self._mapping.label, self._reference
         surface = checked_label(self._named(label.value or self._value(label.column, rows, 'label')))
         if not surface:
@@ -531,14 +497,14 @@ class FrameSlides:
             )
         streams = {one.name: self._samples(one, surface, self._frame_rows(rows), begin_s, end_s)
                    for one in self._streams}  # fmt: skip
-        conditions = self._conditions(times, rows, begin_s, end_s)
-        for place, name in enumerate(CONDITION_UNITS, 1):
-            known = [state[place] for state in conditions if math.isfinite(state[place])]
+        named = ExplorationState(0, f'{self._place}/{number}', self._mapping.motion, Phase.SLIDE, surface=surface)
+        states = self._states(named, times, rows, end_s)
+        for name, column in CONDITION_COLUMNS.items():
+            known = [getattr(state, column) for state in states if math.isfinite(getattr(state, column))]
             if known:
                 self._report.conditions[surface, name].append(self._plausible(name, float(np.mean(known))))
         self._report.slides[surface] += 1
-        named = ExplorationState(0, f'{self._place}/{number}', self._mapping.motion, Phase.SLIDE, surface=surface)
-        return session, named, streams, conditions
+        return session, states, streams
 
     def _named(self, code: str) -> str:
         """Return the name of a label, by number where codes are numbers: 1 names '1.0' and '01', too."""
@@ -601,14 +567,17 @@ class FrameSlides:
             + (f', which may be {" or ".join(likely)}' if likely else '')
         )
 
-    def _conditions(self, times: Array, rows: slice, begin_s: float, end_s: float) -> Conditions:
+    def _states(self, named: ExplorationState, times: Array, rows: slice, end_s: float) -> list[ExplorationState]:
         """Return what holds from 0 on, and every 0.1 s after if a condition changes along the slide."""
-        tracks = {name: self._track(name, times, rows) for name in CONDITION_UNITS}
+        begin_s = float(times[rows].min())
+        tracks = {column: self._track(name, times, rows) for name, column in CONDITION_COLUMNS.items()}
         changing = any(len(values) > 1 and np.ptp(values) > 0 for _, values in tracks.values())
         count = max(1, round((end_s - begin_s) / STATE_S)) if changing else 1
-        edges = [*(begin_s + STATE_S * np.arange(count)), math.inf]
-        means = [[_mean(*tracks[name], a, b) for name in CONDITION_UNITS] for a, b in pairwise(edges)]
-        return [(float(at_s - begin_s), *mean) for at_s, mean in zip(edges, means, strict=False)]
+        states = []
+        for start_s, stop_s in pairwise([*(begin_s + STATE_S * np.arange(count)), math.inf]):
+            means: dict[str, Any] = {column: _mean(*track, start_s, stop_s) for column, track in tracks.items()}
+            states.append(replace(named, stamp_ns=round((start_s - begin_s) * NANOSECONDS), **means))
+        return states
 
     def _track(self, name: str, times: Array, rows: slice) -> tuple[Array, Array]:
         """Return times and known values of a condition in SI units, (n,) each; a force and a speed without sign."""
@@ -652,7 +621,6 @@ def _mean(times: Array, values: Array, begin_s: float, end_s: float) -> float:
 # Bags of the slides.
 
 MAX_BAGS = 500
-Message = tuple[int, str, TactileSignal | ExplorationState]  # log time, topic, value
 
 
 class SlideBags:
@@ -674,25 +642,30 @@ class SlideBags:
         """Paths of the bags in the order in which they were begun."""
         return [bag.path for bag in self._bags.values()]
 
-    def write(self, session: str, named: ExplorationState, streams: SlideStreams, conditions: Conditions) -> None:
-        """Write a slide into the bag of a session."""
+    def write(self, session: str, states: Sequence[ExplorationState], streams: SlideStreams) -> None:
+        """Write a slide, whose stamps count from 0, into the bag of a session."""
         bag = self._bag(session)
         if bag is None:
             return
-        duration_s = max(
-            float(index[-1] + 1) / (stream.rate_hz * stream.per_row) for stream, _, index in streams.values()
-        )
-        messages: list[Message] = [*self._states(named, conditions, duration_s)]
-        sensor = self._mapping.sensor
+        messages: list[tuple[int, str, Any]] = []
+        end_ns = 1
         for topic, (stream, samples, index) in streams.items():
-            first, units = self._next.get((session, topic), 0), (stream.params.unit,) * len(stream.channels)
-            none = np.empty((0, len(units)), dtype=np.float32)
+            units, rate_hz = (stream.params.unit,) * len(stream.channels), stream.rate_hz * stream.per_row
             like = TactileSignal(
-                0, sensor, stream.channels, units, stream.rate_hz * stream.per_row, first, none, sensor
-            )
+                0, self._mapping.sensor, stream.channels, units, rate_hz, self._next.get((session, topic), 0),
+                np.empty((0, len(units)), dtype=np.float32), self._mapping.sensor,
+            )  # fmt: skip
             for batch in slide_batches(like, samples, index, self._now_ns):
                 messages.append((batch.end_ns + DELAY_NS, topic, batch))
                 self._next[session, topic] = batch.next_sample
+            end_ns = max(end_ns, round(float(index[-1] + 1) / rate_hz * NANOSECONDS))
+        for state, until_ns in zip(states, [*(state.stamp_ns for state in states[1:]), end_ns], strict=True):
+            at_ns, steady_s = self._now_ns + state.stamp_ns, max(0, until_ns - state.stamp_ns) / NANOSECONDS
+            progress = state.stamp_ns / end_ns
+            messages.append((at_ns, STATES, replace(state, stamp_ns=at_ns, steady_s=steady_s, progress=progress)))
+        over = replace(states[-1], stamp_ns=self._now_ns + end_ns, progress=1.0)
+        for count, phase in enumerate((Phase.LIFT, Phase.DONE), 3):
+            messages.append((over.stamp_ns + count * DELAY_NS, STATES, replace(over, phase=phase)))
         bag.write_all(messages)
         self._now_ns = max(log_ns for log_ns, _, _ in messages) + PAUSE_NS
 
@@ -709,19 +682,6 @@ class SlideBags:
             self._out.mkdir(parents=True, exist_ok=True)
             self._bags[session] = self._open.enter_context(BagWriter(self._out / name))
         return self._bags[session]
-
-    def _states(self, named: ExplorationState, conditions: Conditions, duration_s: float) -> Iterator[Message]:
-        ends_s = [*(start_s for start_s, *_ in conditions[1:]), duration_s]
-        for (begin_s, speed_m_s, force_n, direction_rad), until_s in zip(conditions, ends_s, strict=True):
-            stamp_ns, stop_ns = (self._now_ns + round(at_s * NANOSECONDS) for at_s in (begin_s, until_s))
-            yield stamp_ns, 'exploration', replace(
-                named, stamp_ns=stamp_ns, steady_s=max(0, stop_ns - stamp_ns) / NANOSECONDS, speed_m_s=speed_m_s,
-                force_n=force_n, direction_rad=direction_rad, progress=begin_s / max(duration_s, 1e-9),
-            )  # fmt: skip
-        end_ns = self._now_ns + round(duration_s * NANOSECONDS)
-        for count, phase in enumerate((Phase.LIFT, Phase.DONE), 1):
-            state = replace(named, stamp_ns=end_ns, phase=phase, progress=1.0)
-            yield end_ns + (2 + count) * DELAY_NS, 'exploration', state
 
     def __enter__(self) -> SlideBags:
         return self
