@@ -478,7 +478,7 @@ def arrays(folder: Path, first: str, second: str) -> None:
 @pytest.mark.parametrize(('first', 'second'), [('samples', 'channels'), ('channels', 'samples'), ('', '')])
 def test_arrays_of_two_dimensions_are_read_as_their_labels_name_them(tmp_path: Path, first: str, second: str) -> None:
     streams = {'signal': {'columns': ['/a/data.*']}}
-    truth: Truth = [('cork', np.c_[X, Y])] if first else "named '' and '', which does not tell samples"
+    truth: Truth = [('cork', np.c_[X, Y])] if first else "named '', '', which does not tell samples"
     check(
         tmp_path, lambda folder: arrays(folder, first, second), {'files': '{material}_{run}', 'streams': streams},
         truth, 'bag',

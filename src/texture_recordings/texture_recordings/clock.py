@@ -197,7 +197,7 @@ def _in_bursts(times: Array, samples: AnyArray, burst_s: float) -> AnyArray:
         raise ClockFault(1, 'most rows are there twice, with one time and the same values; save each row once')
     # Nobody knows which row a burst of another size lacks; a slide may begin and end within one.
     size, steps = int(np.median(counts)), np.diff(times[starts[1:]])
-    if (counts[1:-1] != size).any() or (steps > GAP * np.median(steps)).any():
+    if (counts[1:-1] != size).any() or (len(steps) and steps.max() > GAP * np.median(steps)):
         raise ClockFault(
             0, f'rows come in bursts of {counts.min()} to {counts.max()}, every {steps.min():.3g} to {steps.max():.3g} '
             f's, so lost rows cannot be told; by rows and duration the rate is {_mean_hz(times):.4g} Hz; '

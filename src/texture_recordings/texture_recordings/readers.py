@@ -328,16 +328,12 @@ def _read_mat(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
 def _members(values: Mapping[str, Any], prefix: str = '') -> Iterator[tuple[str, AnyArray]]:
     """Yield arrays by their path: members of structs as 'run/acc', elements of arrays of these and cells from 1 on."""
     for name, value in values.items():
-        if not isinstance(value, np.ndarray):
-            continue
-        elements = {str(number): one for number, one in enumerate(value.ravel(order='F'), 1)}
-        if value.dtype.names:
-            for number, one in elements.items():
-                folder = f'{prefix}{name}/' if len(elements) == 1 else f'{prefix}{name}/{number}/'
-                yield from _members({part: one[part] for part in value.dtype.names}, folder)
-        elif value.dtype.kind == 'O':
-            yield from _members(elements, f'{prefix}{name}/')
-        elif value.dtype.kind in 'biufU':
+        if isinstance(value, np.ndarray) and value.dtype.kind in 'OV':
+            for number, one in enumerate(value.ravel(order='F'), 1):
+                parts = {part: one[part] for part in value.dtype.names} if value.dtype.names else {str(number): one}
+                numbered = f'{number}/' if value.dtype.names and value.size > 1 else ''
+                yield from _members(parts, f'{prefix}{name}/{numbered}')
+        elif isinstance(value, np.ndarray) and value.dtype.kind in 'biufU':
             yield f'{prefix}{name}', value
 
 
@@ -558,23 +554,23 @@ def _values(value: Any, path: str, found: dict[str, AnyArray]) -> None:
 def _rows_of(value: Any, msgtype: str) -> dict[str, AnyArray]:
     """Return the values of a message by name, (n,) each; of an array of two dimensions, n consecutive samples."""
     found: dict[str, AnyArray] = {}
-    if msgtype == 'sensor_msgs/msg/JointState':
+    if msgtype == 'sensor_msgs/msg/JointState':  # whose order may differ from bag to bag
         for kind in ('position', 'velocity', 'effort'):
-            for joint, number in zip(value.name, getattr(value, kind), strict=False):
-                found[f'{kind}.{joint}'] = np.array([number])
-    elif msgtype in ('std_msgs/msg/Float32MultiArray', 'std_msgs/msg/Float64MultiArray') and len(value.layout.dim) == 2:
-        labels = tuple(axis.label.strip().lower() for axis in value.layout.dim)
-        if labels not in (AXES, AXES[::-1]):
-            raise InvalidData(
-                f"its dimensions are named '{labels[0]}' and '{labels[1]}', which does not tell samples from "
-                "channels; republish it with the labels 'samples' and 'channels'"
-            )
-        table = value.data[value.layout.data_offset :].reshape([axis.size for axis in value.layout.dim])
-        table = table if labels == AXES else table.T
-        found = {f'data.{number}': table[:, number] for number in range(min(table.shape[1], MAX_FIELDS))}
-    else:
+            numbers = zip(value.name, getattr(value, kind), strict=False)
+            found |= {f'{kind}.{joint}': np.array([number]) for joint, number in numbers}
+        return found
+    if msgtype not in ('std_msgs/msg/Float32MultiArray', 'std_msgs/msg/Float64MultiArray') or not value.layout.dim[1:]:
         _values(value, '', found)
-    return found
+        return found
+    labels = tuple(axis.label.strip().lower() for axis in value.layout.dim)
+    if labels not in (AXES, AXES[::-1]):
+        raise InvalidData(
+            f'its dimensions are named {", ".join(map(repr, labels))}, which does not tell samples from channels; '
+            "republish it with the labels 'samples' and 'channels'"
+        )
+    table = value.data[value.layout.data_offset :].reshape([axis.size for axis in value.layout.dim])
+    table = table if labels == AXES else table.T
+    return {f'data.{number}': table[:, number] for number in range(min(table.shape[1], MAX_FIELDS))}
 
 
 def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[Frame]:
@@ -595,21 +591,18 @@ def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
         return any(fnmatch.fnmatchcase(connection.topic, topic) for topic in topics)
 
     for message in read_foreign(path, is_wanted):
-        name, msgtype = message.topic, message.msgtype
+        name = message.topic
         if name not in types:
             types[name] = _types_of(seen[name])
         before = rows.setdefault(name, [])
-        where = f"message {len(before)} of '{name}'"
         try:
-            value = types[name].deserialize_cdr(message.data, msgtype)
-            found = _rows_of(value, msgtype)
-        except InvalidData as error:
-            raise InvalidData(f'{where}: {error}') from error
+            value = types[name].deserialize_cdr(message.data, message.msgtype)
+            found = _rows_of(value, message.msgtype)
         except Exception as error:
-            raise InvalidData(f'{where} is damaged: {error}; record it again') from error
+            raise InvalidData(f"message {len(before)} of '{name}' cannot be read: {error}; record it again") from error
         if before and found.keys() != before[0].keys():
             other = ', '.join(sorted(found.keys() ^ before[0].keys())[:5])
-            raise InvalidData(f'{where} has other fields than the first: {other}')
+            raise InvalidData(f"message {len(before)} of '{name}' has other fields than the first: {other}")
         take(10 * len(found) + sum(map(len, found.values())))  # small arrays take more than their values
         before.append(found)
         stamp = getattr(getattr(value, 'header', None), 'stamp', None)
@@ -628,7 +621,7 @@ def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
         # The samples of one message lie evenly between it and the next.
         times_s = (times_ns[name] - begin_ns) / NANOSECONDS
         counts = np.array([max(map(len, part.values()), default=0) for part in parts])
-        steps_s = np.diff(times_s, append=times_s[-1] + np.median(np.diff(times_s)) if len(times_s) > 1 else times_s)
+        steps_s = np.diff(times_s, append=times_s[-1] + (np.median(np.diff(times_s)) if len(times_s) > 1 else 0.0))
         within = np.concatenate([np.arange(count) / max(count, 1) for count in counts])
         clock = f'{name}/time'
         columns[clock] = np.repeat(times_s, counts) + np.repeat(steps_s, counts) * within
@@ -656,19 +649,18 @@ def _by_one_clock(stamps: Mapping[str, AnyArray]) -> dict[str, AnyArray]:
 
     `stamps` are (n, 2), by the device and by the recorder.
     """
-    ahead = {name: both[:, 0] - both[:, 1] for name, both in stamps.items()}
-    usual = {name: int(np.median(values)) for name, values in ahead.items()}
-    if max(usual.values()) - min(usual.values()) <= OTHER_CLOCK_NS:
+    ahead = {name: np.percentile(both[:, 0] - both[:, 1], (5, 50, 95)) for name, both in stamps.items()}
+    usual = [middle for _, middle, _ in ahead.values()]
+    if max(usual) - min(usual) <= OTHER_CLOCK_NS:
         return {name: both[:, 0] for name, both in stamps.items()}
-    for name, values in ahead.items():
-        low, high = np.percentile(values, (5, 95)).tolist()
+    for name, (low, middle, high) in ahead.items():
         if high - low > OTHER_CLOCK_NS:
             raise InvalidData(
                 f"topic '{name}': the stamps differ from the times of logging, which other topics have, by "
-                f'{usual[name] / NANOSECONDS:.4g} s, and that changes by {(high - low) / NANOSECONDS:.3g} s; record '
-                'topics with stamps of one clock'
+                f'{middle / NANOSECONDS:.4g} s, and that changes by {(high - low) / NANOSECONDS:.3g} s; record topics '
+                'with stamps of one clock'
             )
-    return {name: both[:, 0] - usual[name] for name, both in stamps.items()}
+    return {name: both[:, 0] - round(ahead[name][1]) for name, both in stamps.items()}
 
 
 # ---- the kinds of files
