@@ -397,15 +397,13 @@ class FrameSlides:
                 continue
             text = array.dtype.kind in 'OUS'
             values = self._frame.texts(name) if text else self._frame.numbers(name)
-            if not text and (values % 1.0).any():
-                continue
-            found, codes = np.unique(values, return_inverse=True)
-            if not 2 <= len(found) <= MAX_CODES or len(codes) < ROWS_A_CODE * len(found):
+            count = len(np.unique(values)) if text or not (values % 1.0).any() else 0
+            if not 2 <= count <= MAX_CODES or len(values) < ROWS_A_CODE * count:
                 continue
             for span in self._spans:
                 rows = self._reference.rows[span]
-                rows = rows[self._frame.texts(name)[rows] != ''] if text else rows
-                if row := _mixed(codes[rows], text=text):
+                rows = rows[values[rows] != ''] if text else rows
+                if row := _mixed(values[rows]):
                     first, other = self._frame.texts(name)[rows[row - 1 : row + 1]]
                     raise self._fault(
                         name, rows[row], f"it changes from '{first}' to '{other}' within a slide and no key uses it: "
@@ -600,13 +598,14 @@ def _is_one_of(text: str, wanted: Sequence[str]) -> bool:
     return any(fnmatch.fnmatchcase(text, one) or text == one for one in wanted)
 
 
-def _mixed(codes: AnyArray, *, text: bool) -> int:
-    """Return the first row at which texts change, or codes that come in turn or in blocks; 0 if none does."""
+def _mixed(values: AnyArray) -> int:
+    """Return the first row at which texts change, or numbers in turn or blocks of counted ones; 0 if none does."""
+    found, codes = np.unique(values, return_inverse=True)
     changes = np.flatnonzero(codes[1:] != codes[:-1]) + 1
-    count = len(np.unique(codes))
-    lags = range(2, min(2 * count, len(codes) // 2, MAX_TURNS) + 1) if len(changes) > 0.5 * len(codes) else ()
+    counted = values.dtype.kind != 'O' and len(changes) == len(found) - 1 == np.ptp(found)
+    lags = range(2, min(2 * len(found), len(codes) // 2, MAX_TURNS) + 1) if len(changes) > 0.5 * len(codes) else ()
     in_turn = any((codes[lag:] == codes[:-lag]).mean() > 0.7 for lag in lags)
-    return int(changes[0]) if len(changes) and (text or in_turn or len(changes) == count - 1) else 0
+    return int(changes[0]) if len(changes) and (values.dtype.kind == 'O' or in_turn or counted) else 0
 
 
 def _mean(times: Array, values: Array, begin_s: float, end_s: float) -> float:
