@@ -15,7 +15,7 @@ from scipy.io import wavfile
 
 from texture_core.errors import InvalidData, MissingLibrary, UnknownName
 from texture_recordings.mapping import TableMapping, mapping_from, template_fields
-from texture_recordings.readers import MAPPED, Frame, chosen, frames
+from texture_recordings.readers import MAPPED, TableFrame, chosen, frames
 from texture_recordings.tables import import_tables
 
 pa = pytest.importorskip('pyarrow')
@@ -59,7 +59,7 @@ WRITERS: dict[str, Callable[[Path], object]] = {
 }
 
 
-def tables(path: Path, chosen: TableMapping | None = None) -> list[Frame]:
+def tables(path: Path, chosen: TableMapping | None = None) -> list[TableFrame]:
     return list(frames(path, path.name, chosen or mapping()))
 
 

@@ -41,7 +41,7 @@ Take = Callable[[float], None]  # asks for a number of values; InvalidData beyon
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class TableFrame:
     """Columns that belong together, by name: (n,) numbers or texts, or () for what holds for all rows."""
 
     place: str
@@ -106,7 +106,7 @@ def placed(place: str) -> Iterator[None]:
         raise InvalidData(f"'{place}'{between}{sentence.removeprefix('it ')}") from error
 
 
-def frames(path: Path, place: str, mapping: TableMapping) -> Iterator[Frame]:
+def frames(path: Path, place: str, mapping: TableMapping) -> Iterator[TableFrame]:
     """Yield the frames of a file; InvalidData with its place, whatever is wrong with it."""
     with placed(place):
         if kind_of(path) in OTHER_KINDS:
@@ -146,7 +146,7 @@ THOUSANDS = re.compile(r'[+-]?[1-9]\d{0,2}(,\d{3})+')
 NUMERIC = 0.9  # share of numbers in a column of numbers
 
 
-def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[Frame]:
+def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:
     """Yield the columns of a text file: numbers where the mapping wants them or nine of ten cells are some, or texts.
 
     A row is malformed if it has other cells than the first one, or a text in a column of numbers, used or not.
@@ -202,7 +202,7 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
         if columns[name].dtype.kind == 'O':  # no border is seen at a malformed row
             last = np.maximum.accumulate(np.where(marked, np.argmin(marked), np.arange(len(marked))))
             columns[name] = columns[name][last]
-    yield Frame(place, columns, lines=np.concatenate(lines), junk=marked, reasons=reasons)
+    yield TableFrame(place, columns, lines=np.concatenate(lines), junk=marked, reasons=reasons)
 
 
 def _names(cells: Sequence[str], form: FileFormat) -> list[str]:
@@ -299,7 +299,7 @@ def number_of(cell: str) -> float:
 # ---- files of arrays
 
 
-def _read_numpy(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[Frame]:
+def _read_numpy(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:
     with open_regular(path) as opened:
         if path.suffix.lower() == '.npy':
             content = read_array(opened)  # nothing in a file is run
@@ -309,7 +309,7 @@ def _read_numpy(path: Path, place: str, mapping: TableMapping, take: Take) -> It
             yield from _frames(archive.names, archive.__getitem__, place, mapping, take)
 
 
-def _read_mat(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[Frame]:
+def _read_mat(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:
     from scipy.io import loadmat, whosmat  # noqa: PLC0415 – recording needs no scipy
 
     with open_regular(path) as opened:
@@ -337,7 +337,9 @@ def _members(values: Mapping[str, Any], prefix: str = '') -> Iterator[tuple[str,
             yield f'{prefix}{name}', value
 
 
-def _read_hdf5(path: Path, place: str, mapping: TableMapping, take: Take, *, matlab: bool = False) -> Iterator[Frame]:
+def _read_hdf5(
+    path: Path, place: str, mapping: TableMapping, take: Take, *, matlab: bool = False
+) -> Iterator[TableFrame]:
     h5py = library(*HDF5)
     with open_regular(path) as opened, h5py.File(opened, 'r') as file:
         found: dict[str, Any] = {}
@@ -396,7 +398,7 @@ def _refuse_hidden(member: Any, where: str) -> None:
         raise InvalidData(f'{where} has the attribute {min(scaled)}; save the values that are meant, without it')
 
 
-def _read_wav(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[Frame]:
+def _read_wav(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:
     from scipy.io import wavfile  # noqa: PLC0415 – recording needs no scipy
 
     with open_regular(path) as opened, warnings.catch_warnings():
@@ -432,7 +434,7 @@ def _check_wav(file: Any) -> None:
     file.seek(0)
 
 
-def _read_parquet(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[Frame]:
+def _read_parquet(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:
     pyarrow, parquet = library('pyarrow', *PARQUET[1:]), library(*PARQUET)
     types = pyarrow.types
     with open_regular(path) as opened:
@@ -454,12 +456,12 @@ def _read_parquet(path: Path, place: str, mapping: TableMapping, take: Take) -> 
                 columns[name] = np.asarray(column.to_numpy()).astype('datetime64[ns]').astype(np.int64)
             elif types.is_integer(column.type) or types.is_floating(column.type) or types.is_boolean(column.type):
                 columns[name] = np.asarray(column.to_numpy())
-        yield Frame(place, columns)
+        yield TableFrame(place, columns)
 
 
 def _frames(
     names: Sequence[str], load: Callable[[str], AnyArray], place: str, mapping: TableMapping, take: Take
-) -> Iterator[Frame]:
+) -> Iterator[TableFrame]:
     """Yield the frames that arrays form.
 
     Without a template all arrays are one frame. With one, an array whose name is of its form is a frame whose columns
@@ -482,7 +484,7 @@ def _frames(
             array = load(name)
             take(array.size * max(1.0, array.dtype.itemsize / 8))
             arrays[column] = _arranged(array, mapping.format)
-        yield Frame(within, {**_unfolded(arrays), **{key: np.array(text) for key, text in fields.items()}})
+        yield TableFrame(within, {**_unfolded(arrays), **{key: np.array(text) for key, text in fields.items()}})
 
 
 def _arranged(array: AnyArray, form: FileFormat) -> AnyArray:
@@ -573,7 +575,7 @@ def _rows_of(value: Any, msgtype: str) -> dict[str, AnyArray]:
     return {f'data.{number}': table[:, number] for number in range(min(table.shape[1], MAX_FIELDS))}
 
 
-def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[Frame]:
+def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:
     """Yield the one frame of a bag: the topics that the mapping names, each with its time.
 
     Times are those of the headers, or of logging where there are none, from the first message of the bag on. A device
@@ -628,7 +630,7 @@ def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
         for part in parts[0]:
             columns[f'{name}/{part}'] = np.concatenate([one[part] for one in parts])
             clocks[f'{name}/{part}'] = clock
-    yield Frame(place, columns, clocks=clocks)
+    yield TableFrame(place, columns, clocks=clocks)
 
 
 def _types_of(connection: Any) -> Any:
@@ -666,7 +668,7 @@ def _by_one_clock(stamps: Mapping[str, AnyArray]) -> dict[str, AnyArray]:
 # ---- the kinds of files
 
 BAG = 'bag'
-READERS: Mapping[str, Callable[[Path, str, TableMapping, Take], Iterator[Frame]]] = {
+READERS: Mapping[str, Callable[[Path, str, TableMapping, Take], Iterator[TableFrame]]] = {
     '.csv': _read_csv,
     '.tsv': _read_csv,
     '.txt': _read_csv,

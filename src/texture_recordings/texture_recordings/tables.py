@@ -33,7 +33,17 @@ from texture_recordings.mapping import (
     TableMapping,
     template_fields,
 )
-from texture_recordings.readers import EXAMPLES, MAPPED, OTHER_KINDS, Frame, chosen, frames, kind_of, number_of, placed
+from texture_recordings.readers import (
+    EXAMPLES,
+    MAPPED,
+    OTHER_KINDS,
+    TableFrame,
+    chosen,
+    frames,
+    kind_of,
+    number_of,
+    placed,
+)
 from texture_recordings.slides import STATES
 
 PLAUSIBLE_HZ, LIKELY_HZ = (5.0, 200_000.0), (20.0, 20_000.0)
@@ -207,7 +217,7 @@ SlideStreams = Mapping[str, tuple[Stream, AnyArray, AnyArray]]
 class FrameSlides:
     """The slides of one frame."""
 
-    def __init__(self, mapping: TableMapping, frame: Frame, report: ImportReport) -> None:
+    def __init__(self, mapping: TableMapping, frame: TableFrame, report: ImportReport) -> None:
         self._mapping, self._report, self._place = mapping, report, frame.place
         self._frame = self._wanted_rows(frame)
         names = [name for name, array in self._frame.columns.items() if array.ndim]
@@ -252,7 +262,7 @@ class FrameSlides:
 
     # ---- rows and streams
 
-    def _wanted_rows(self, frame: Frame) -> Frame:
+    def _wanted_rows(self, frame: TableFrame) -> TableFrame:
         for name, value in self._mapping.rows.items():
             texts = frame.texts(name)
             if not texts.ndim:
@@ -304,6 +314,7 @@ class FrameSlides:
         bad &= kept
         if self._frame.junk is not None and len(self._frame.junk) == len(bad):
             bad |= self._frame.junk
+            samples[self._frame.junk] = np.nan
         clock, time_s = params.time.column or group[0], None
         if clock:
             raw = self._frame.numbers(clock)
