@@ -16,7 +16,8 @@ ROUND_RATE = 1e-3  # a rate that is so near to one of two digits is taken for th
 GAP = 1.5  # steps of time longer than so many sampling intervals are gaps, whose samples count as lost
 SAME_TIME = 0.1  # rows nearer than this share of an interval have one time
 COARSE = 0.45  # intervals: of a clock that counts in longer steps, rounding looks like losses
-OFF_GRID = 0.4  # intervals by which rows may be off the grid where samples are lost
+NEAR = 11  # rows that have one median
+OFF_GRID = 0.45  # intervals by which rows may be off the grid where samples are lost, or their median elsewhere
 MOST_OFF, MOST_OFF_SHARE = 3.0, 0.003  # intervals, and share of the rows of a slide, where none is
 BURST_DUTY, MIN_BURSTS, LONGEST_BURST_S = 0.1, 4, 1.0
 # Counters of 16 to 32 bits, and times of the day, s. In a shorter period, losses and slower rates would be unseen.
@@ -172,18 +173,20 @@ def _places(times: Array, rows: AnyArray, rate_hz: float, out: int, *, stated: b
             0, f'time counts in steps of {tick_s:g} s at {rate_hz:g} Hz, so lost samples cannot be told from rounding; '
             f'give `rate_hz` next to the column of time, or {WITHOUT_TIME}',
         )  # fmt: skip
-    # Where samples are lost, each row must lie on the grid; where none is, the rate must hold as a whole.
-    lag = np.abs(_rest(times, index))
-    if missing.any() and lag.max() > OFF_GRID:
+    # The rate must hold as a whole; where samples are lost each row must lie on the grid, elsewhere none may shift.
+    lag = _rest(times, index)
+    if np.abs(lag).max() > MOST_OFF + MOST_OFF_SHARE * len(index):
+        row = int(np.abs(lag).argmax())
         raise ClockFault(
-            int(rows[lag.argmax()]), f'the steps of time are too irregular for a rate of {rate_hz:g} Hz: this row is '
-            f'{lag.max():.2g} samples off the grid, so losses cannot be told from jitter, and by rows and duration the '
-            f'rate is {_mean_hz(times):.4g} Hz; {WITHOUT_TIME}',
+            int(rows[row]), f'the rate changes within a slide: by {rate_hz:g} Hz this row is {abs(lag[row]):.3g} samples '
+            'off; cut the slides where it changes, and give each rate a mapping',
         )  # fmt: skip
-    if lag.max() > MOST_OFF + MOST_OFF_SHARE * len(index):
+    off = np.abs(lag) if missing.any() else _shifts(lag)
+    if off.max(initial=0.0) > OFF_GRID:
         raise ClockFault(
-            int(rows[lag.argmax()]), f'the rate changes within a slide: by {rate_hz:g} Hz this row is {lag.max():.3g} '
-            'samples off; cut the slides where it changes, and give each rate a mapping',
+            int(rows[off.argmax()]), f'the steps of time are too irregular for a rate of {rate_hz:g} Hz: about this '
+            f'row they are {off.max():.2g} samples off the grid, so losses cannot be told from jitter, and by rows and '
+            f'duration the rate is {_mean_hz(times):.4g} Hz; {WITHOUT_TIME}',
         )  # fmt: skip
     return index
 
@@ -216,6 +219,14 @@ def _rest(times: Array, numbers: AnyArray) -> Array:
     if len(times) < 3 or not np.ptp(since) > 0:
         return np.zeros(len(times))
     return np.asarray(numbers - np.polyval(np.polyfit(since, numbers.astype(float), 1), since))
+
+
+def _shifts(lag: Array) -> Array:
+    """Return how far apart the medians of the rows before and behind are, (n,): a loss among late rows is a step."""
+    if len(lag) < 2 * NEAR:
+        return lag[:0]
+    medians = np.median(np.lib.stride_tricks.sliding_window_view(lag, NEAR), axis=1)
+    return np.asarray(np.abs(medians[NEAR:] - medians[:-NEAR]))
 
 
 def _tick_s(times: Array) -> float:
