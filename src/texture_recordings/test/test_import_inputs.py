@@ -90,8 +90,7 @@ PAUSE = {'slides': {'by': 'pause', 'min_s': 0.05}}
 BACK = r"row \d+, column 't': time goes back .*by: pause"
 CLOCKS: dict[str, tuple[Write, dict, Truth]] = {
     'bursts that lost rows': (
-        csv(bursts(3)[~LOST], X[~LOST]), {},
-        'in bursts of 1 to 3, .*so lost rows cannot be told; .* the rate is 99',
+        csv(bursts(3)[~LOST], X[~LOST]), {}, 'in bursts of 1 to 3, .*so lost rows cannot be told; .* the rate is 99',
     ),
     'bursts of a buffer that is read at any time': (csv(UNEVEN, X), {}, 'in bursts of 2 to 3, .*so lost rows cannot'),
     'bursts in disorder': (

@@ -178,8 +178,8 @@ def _places(times: Array, rows: AnyArray, rate_hz: float, out: int, *, stated: b
     if np.abs(lag).max() > MOST_OFF + MOST_OFF_SHARE * len(index):
         row = int(np.abs(lag).argmax())
         raise ClockFault(
-            int(rows[row]), f'the rate changes within a slide: by {rate_hz:g} Hz this row is {abs(lag[row]):.3g} samples '
-            'off; cut the slides where it changes, and give each rate a mapping',
+            int(rows[row]), f'the rate changes within a slide: by {rate_hz:g} Hz this row is {abs(lag[row]):.3g} '
+            'samples off; cut the slides where it changes, and give each rate a mapping',
         )  # fmt: skip
     off = np.abs(lag) if missing.any() else _shifts(lag)
     if off.max(initial=0.0) > OFF_GRID:
