@@ -368,6 +368,10 @@ CONTAINERS: dict[str, tuple[Write, dict, Truth]] = {
         npz(X=np.ones((20, 100, 3))), {**ANY, 'streams': {'signal': {'columns': ['X.*'], 'rate_hz': 100.0}}},
         r'slides: \{by: column, column: trial\}',
     ),
+    'many short trials as one slide': (
+        npz(X=np.random.default_rng(0).normal(size=(3000, 5, 2))),
+        {**ANY, 'streams': {'signal': {'columns': ['X.*'], 'rate_hz': 100.0}}}, "column 'trial': it changes from '0'",
+    ),
     'a folder': (both(csv(T, X), lambda folder: (folder / 'felt_1.csv').mkdir()), {}, "'felt_1.csv' is a folder"),
 }  # fmt: skip
 

@@ -176,7 +176,8 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
             for name, cells in zip(names, zip(*whole, strict=True), strict=True):
                 text = name in mapping.texts()
                 if not text or name in numbers:
-                    values = np.array([_parsed(cell, form.decimal) for cell in cells])
+                    points = [_with_point(cell) for cell in cells] if form.decimal == ',' else cells
+                    values = np.array([number_of(cell) for cell in points])
                     text |= not numeric.setdefault(name, name in numbers or np.isfinite(values).mean() > NUMERIC)
                 for row in np.flatnonzero(np.isnan(values)).tolist() if numeric.get(name) else ():
                     if cells[row].lower() not in BLANK:
@@ -234,12 +235,15 @@ def _reason(name: str, cell: str, form: FileFormat) -> str:
 
 def _refuse_commas(name: str, cells: Sequence[str], form: FileFormat, delimiter: str) -> None:
     """Refuse commas that may be decimal as well as delimiters, or that separate thousands where they are decimal."""
-    known = [cell for cell in cells if cell]
-    padded = any(len(cell) > 1 and cell[0] == '0' for cell in known) and all(cell.isdigit() for cell in known)
-    if delimiter == ',' and padded and known != sorted(known):
+    digits = (
+        [cell for cell in cells if cell]
+        if delimiter == ',' and all(cell.isdigit() or not cell for cell in cells)
+        else []
+    )
+    if any(len(cell) > 1 and cell[0] == '0' for cell in digits) and digits != sorted(digits):
         raise InvalidData(
-            f"the column '{name}' holds digits such as {known[0]}, so commas may be decimal as well as "
-            'between columns; save it with another delimiter'
+            f"the column '{name}' holds digits such as {digits[0]}, so commas may be decimal as well as between "
+            'columns; save it with another delimiter'
         )
     commas = [cell for cell in cells if ',' in cell] if form.decimal == ',' else []
     if 0 < len(commas) < len(cells) and all(THOUSANDS.fullmatch(cell) for cell in commas):
@@ -277,10 +281,8 @@ def _cells(line: str, delimiter: str) -> list[str]:
     return [cell.strip() for cell in cells]
 
 
-def _parsed(cell: str, decimal: str) -> float:
-    if decimal == ',':  # '1.234' may be a thousand
-        return math.nan if '.' in cell else number_of(cell.replace(',', '.'))
-    return number_of(cell)
+def _with_point(cell: str) -> str:
+    return '?' if '.' in cell else cell.replace(',', '.')  # '1.234' may be a thousand
 
 
 def _texts(cells: Sequence[str]) -> AnyArray:

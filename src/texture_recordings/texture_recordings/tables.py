@@ -52,7 +52,7 @@ STATE_S = 0.1  # a state so often where a condition changes along a slide
 SAME_TIME_S = 1e-9
 MAX_NUMBERED = 3  # columns name_1 … name_n beyond this may be samples: the mapping has to tell
 MAX_SLIDES = 20_000  # of one file
-MAX_CODES, ROWS_A_CODE = 1000, 10  # of a column that may name sensors, trials or runs, and rows of each at least
+ROWS_A_CODE = 2  # at least, of a column that may name sensors, trials or runs
 MAX_TURNS = 100  # sensors of which one row each follows the other
 # Lowest and highest mean of a slide that a tactile finger reaches, in SI units.
 PLAUSIBLE: Mapping[str, tuple[float, float]] = {
@@ -226,6 +226,7 @@ class FrameSlides:
         numbers = [*(column for columns in self._used.values() for column in columns), *mapping.numbers()]
         self._numbers = {name: self._frame.numbers(name) for name in numbers}
         self._malformed: dict[int, AnyArray] = {}  # by number of rows
+        self._held: dict[str, AnyArray] = {}
         streams = [self._stream(name, params) for name, params in mapping.streams.items()]
         self._check_malformed()
         # Slides are cut by the rows of the stream that corresponds to the column at which they end.
@@ -409,7 +410,7 @@ class FrameSlides:
             text = array.dtype.kind in 'OUS'
             values = self._frame.texts(name) if text else self._frame.numbers(name)
             count = len(np.unique(values)) if text or not (values % 1.0).any() else 0
-            if not 2 <= count <= MAX_CODES or len(values) < ROWS_A_CODE * count:
+            if not 2 <= count <= len(values) / ROWS_A_CODE:
                 continue
             for span in self._spans:
                 rows = self._reference.rows[span]
@@ -478,8 +479,10 @@ class FrameSlides:
 
     def _value(self, name: str, rows: slice, kind: str) -> str:
         """Return the one value that a column has during a slide, the last one before it where it has none."""
-        texts = self._aligned(self._texts, name)[: rows.stop]
-        held = texts[np.maximum.accumulate(np.where(texts != '', np.arange(len(texts)), 0))][rows]
+        if name not in self._held:
+            texts = self._aligned(self._texts, name)
+            self._held[name] = texts[np.maximum.accumulate(np.where(texts != '', np.arange(len(texts)), 0))]
+        held = self._held[name][rows]
         known = np.flatnonzero(held != '')
         if not len(known):
             raise InvalidData(f"column '{name}' has no value during a slide; name another")
