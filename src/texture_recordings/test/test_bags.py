@@ -146,7 +146,8 @@ def test_without_an_explorer_each_folder_of_signals_is_a_namespace(tmp_path: Pat
 
 def test_only_the_requested_stretch_is_read(tmp_path: Path) -> None:
     bag = write(tmp_path / 'bag', count=10)
-    assert [log_ns - STAMP_NS for _, log_ns, _ in read_bag(bag, start_ns=STAMP_NS + 3, stop_ns=STAMP_NS + 5)] == [3, 4]
+    read = read_named(bag, start_ns=STAMP_NS + 3, stop_ns=STAMP_NS + 5)
+    assert [message.log_ns - STAMP_NS for _, message in read] == [3, 4]
 
 
 def test_a_bag_is_never_overwritten(tmp_path: Path) -> None:

@@ -173,11 +173,8 @@ def _files(
         if path.is_dir() and not is_bag(path):
             parts = [one.name for one in path.iterdir() if 'bag' in kinds and one.suffix in ('.mcap', '.db3')]
             if fields is not None and (parts or path.suffix.lower() in kinds):
-                holds = (
-                    f'; it holds {", ".join(sorted(parts)[:3])} without metadata.yaml: ros2 bag reindex'
-                    if parts
-                    else ''
-                )
+                named = ', '.join(sorted(parts)[:3])
+                holds = f'; it holds {named} without metadata.yaml: ros2 bag reindex' if parts else ''
                 raise InvalidData(
                     f"'{place}' is a folder and no file{holds}; move it elsewhere, or correct `files` in the mapping"
                 )
@@ -343,15 +340,15 @@ class FrameSlides:
         together = max(after - before for before, after in pairwise(breaks))
         if not count and together > MAX_NUMBERED:
             raise InvalidData(
-                f"the stream '{name}' has {len(names)} columns, {names[0]} … {names[-1]}, and {rows} "
-                f'rows; write samples_per_row: {together} if a row holds that many consecutive samples of one channel '
-                '(slides: {by: row} if it is a window), samples_per_row: 1 if the columns are channels, or '
-                'format: {transpose: true} if the array lies on its side'
+                f"the stream '{name}' has {len(names)} columns, {names[0]} … {names[-1]}, and {rows} rows; write "
+                f'samples_per_row: {together} if a row holds that many consecutive samples of one channel (slides: '
+                '{by: row} if it is a window), samples_per_row: 1 if the columns are channels, or format: '
+                '{transpose: true} if the array lies on its side'
             )
         if count and all(parts) and any((at + 1) % count for at in breaks[1:-1]):
             raise InvalidData(
-                f"the columns of '{name}' are {', '.join(names[:4])} …, whose numbers do not count up "
-                f"within {count} columns; write them in the order of the samples, such as a range 'name_0-{count - 1}'"
+                f"the columns of '{name}' are {', '.join(names[:4])} …, whose numbers do not count up within {count} "
+                f"columns; write them in the order of the samples, such as a range 'name_0-{count - 1}'"
             )
 
     def _fault(self, column: str, row: int, reason: object) -> InvalidData:
@@ -367,8 +364,8 @@ class FrameSlides:
             self._report.leave_out('malformed rows', count, *(f"'{self._place}', {reason}" for reason in reasons))
             if not length or count > MAX_LEFT_OUT * length:
                 raise InvalidData(
-                    f'it has {count} malformed rows of {length}, first {reasons[0]}; at most '
-                    f'{100 * MAX_LEFT_OUT:g} % are taken; look at the columns and at `format` in the mapping'
+                    f'it has {count} malformed rows of {length}, first {reasons[0]}; at most {100 * MAX_LEFT_OUT:g} % '
+                    'are taken; look at the columns and at `format` in the mapping'
                 )
 
     # ---- slides
@@ -438,15 +435,15 @@ class FrameSlides:
             measured *= per_row
             if not measured:
                 raise InvalidData(
-                    f"the times of '{name}' do not grow from row to row; give a column of time that "
-                    'grows and has enough digits, or `rate_hz` in its place'
+                    f"the times of '{name}' do not grow from row to row; give a column of time that grows and has "
+                    'enough digits, or `rate_hz` in its place'
                 )
         # Of the first file: windows of all are to have as many samples.
         rate_hz = self._report.rates_hz.get(name) or params.rate_hz or measured
         if measured and not 1 / SAME_RATE <= measured / rate_hz <= SAME_RATE:
             raise InvalidData(
-                f"'{name}' has {measured:g} Hz by its times, {rate_hz:g} Hz are expected; look at the "
-                f"unit of column '{stream.clock}' and at `rate_hz` in the mapping"
+                f"'{name}' has {measured:g} Hz by its times, {rate_hz:g} Hz are expected; look at the unit of column "
+                f"'{stream.clock}' and at `rate_hz` in the mapping"
             )
         low, high = PLAUSIBLE_HZ
         if not params.rate_hz and not low <= rate_hz <= high:
@@ -454,8 +451,8 @@ class FrameSlides:
             likely = [one for one, other_hz in of_unit.items() if LIKELY_HZ[0] <= other_hz <= LIKELY_HZ[1]]
             hint = f'; with unit: {likely[0]} it were {of_unit[likely[0]]:g} Hz' if likely else ''
             raise InvalidData(
-                f"the rate of '{name}' is {rate_hz:g} Hz by its times{hint}; give a column of time "
-                f'that grows and its unit, or `rate_hz`, from {low:g} to {high:g}'
+                f"the rate of '{name}' is {rate_hz:g} Hz by its times{hint}; give a column of time that grows and its "
+                f'unit, or `rate_hz`, from {low:g} to {high:g}'
             )
         self._report.rates_hz[name] = rate_hz
         return replace(stream, rate_hz=rate_hz / per_row, burst_s=burst_s)
@@ -464,17 +461,18 @@ class FrameSlides:
         """Return the first row of the frame in a slide of the reference, and the row behind the last."""
         return int(self._reference.rows[span.start]), int(self._reference.rows[span.stop - 1]) + 1
 
-    def _aligned(self, columns: Mapping[str, AnyArray], name: str) -> AnyArray:
-        """Return a column at the rows of the reference: of another clock, the last value until then."""
+    def _aligned(self, columns: Mapping[str, AnyArray], name: str, span: slice = slice(None)) -> AnyArray:
+        """Return a column at rows of the reference: of another clock, the last value until then."""
         values, reference = columns[name], self._reference
+        rows = reference.rows[span]
         if not values.ndim:
-            return np.full(len(reference.rows), values[()], dtype=values.dtype)
+            return np.full(len(rows), values[()], dtype=values.dtype)
         if self._group(name) == reference.group:
-            return values[reference.rows]
+            return values[rows]
         clock = self._frame.clocks.get(name)
         if clock is None or reference.time_s is None:
             raise InvalidData(f"column '{name}' has {len(values)} rows, as no stream; name one of the same length")
-        held = np.searchsorted(self._frame[clock], reference.time_s + SAME_TIME_S, 'right') - 1
+        held = np.searchsorted(self._frame[clock], reference.time_s[span] + SAME_TIME_S, 'right') - 1
         return np.where(held >= 0, values[np.maximum(held, 0)], '' if columns is self._texts else math.nan)
 
     def _value(self, name: str, rows: slice, kind: str) -> str:
@@ -504,13 +502,13 @@ class FrameSlides:
         begin_s, end_s = float(times[rows].min()), float(times[rows].max()) + 1.0 / reference.rate_hz
         if end_s - begin_s > LONGEST_SLIDE_S:
             raise InvalidData(
-                f'row {self._line(reference.rows[rows.start])}: a slide lasts {end_s - begin_s:.4g} '
-                f's, at most {LONGEST_SLIDE_S:g} s are plausible; look at the column of time, its unit and `slides`'
+                f'row {self._line(reference.rows[rows.start])}: a slide lasts {end_s - begin_s:.4g} s, at most '
+                f'{LONGEST_SLIDE_S:g} s are plausible; look at the column of time, its unit and `slides`'
             )
         streams = {one.name: self._samples(one, surface, self._frame_rows(rows), begin_s, end_s)
                    for one in self._streams}  # fmt: skip
         named = ExplorationState(0, f'{self._place}/{number}', self._mapping.motion, Phase.SLIDE, surface=surface)
-        states = self._states(named, times, rows, end_s)
+        states = self._states(named, times, rows, end_s - begin_s)
         for name, column in CONDITION_COLUMNS.items():
             known = [getattr(state, column) for state in states if math.isfinite(getattr(state, column))]
             if known:
@@ -525,8 +523,8 @@ class FrameSlides:
         same = [code] if code in names else [one for one in names if number_of(one) == number]
         if not same and names and math.isfinite(number) and all(math.isfinite(number_of(one)) for one in names):
             raise InvalidData(
-                f'the label {code} has no name; it is none of {", ".join(names)} under `names`; add '
-                'it, or leave its rows out by `values` under `slides`'
+                f'the label {code} has no name; it is none of {", ".join(names)} under `names`; add it, or leave its '
+                'rows out by `values` under `slides`'
             )
         return names[same[0]] if same else code
 
@@ -574,17 +572,17 @@ class FrameSlides:
         number = value / units[given]
         likely = [unit for unit, factor in units.items() if low <= number * factor <= high]
         raise InvalidData(
-            f'the {name} of a slide is {number:.4g} {given}, plausible are '
-            f'{low / units[given]:.3g} to {high / units[given]:.3g} {given}; look at its unit in the mapping'
+            f'the {name} of a slide is {number:.4g} {given}, plausible are {low / units[given]:.3g} to '
+            f'{high / units[given]:.3g} {given}; look at its unit in the mapping'
             + (f', which may be {" or ".join(likely)}' if likely else '')
         )
 
-    def _states(self, named: ExplorationState, times: Array, rows: slice, end_s: float) -> list[ExplorationState]:
+    def _states(self, named: ExplorationState, times: Array, rows: slice, slide_s: float) -> list[ExplorationState]:
         """Return what holds from 0 on, and every 0.1 s after if a condition changes along the slide."""
         begin_s = float(times[rows].min())
         tracks = {column: self._track(name, times, rows) for name, column in CONDITION_COLUMNS.items()}
         changing = any(len(values) > 1 and np.ptp(values) > 0 for _, values in tracks.values())
-        count = max(1, round((end_s - begin_s) / STATE_S)) if changing else 1
+        count = max(1, round(slide_s / STATE_S)) if changing else 1
         states = []
         for start_s, stop_s in pairwise([*(begin_s + STATE_S * np.arange(count)), math.inf]):
             means: dict[str, Any] = {column: _mean(*track, start_s, stop_s) for column, track in tracks.items()}
@@ -595,10 +593,9 @@ class FrameSlides:
         """Return times and known values of a condition in SI units, (n,) each; a force and a speed without sign."""
         quantity = self._mapping.conditions.get(name, Quantity())
         if quantity.column:
-            values = self._aligned(self._numbers, quantity.column)[rows]
-            text = str(self._frame[quantity.column][()])
-            if not self._frame[quantity.column].ndim and text != 'nan' and not np.isfinite(values).all():
-                raise InvalidData(f"'{quantity.column}' is '{text}' in its name; a number is needed there")
+            values, given = self._aligned(self._numbers, quantity.column, rows), self._frame[quantity.column]
+            if not given.ndim and np.isnan(values).any() and str(given) != 'nan':
+                raise InvalidData(f"'{quantity.column}' is '{given}' in its name; a number is needed there")
         else:
             values = np.full(rows.stop - rows.start, float(quantity.value or 'nan'))
         times, values = times[rows][np.isfinite(values)], values[np.isfinite(values)]
