@@ -270,6 +270,9 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
     'sensors without times': (csv(np.ravel(np.c_[X, Y]), [1, 2] * N, names='x,id'), RATE, ID.format(3)),
     'sensors in blocks without times': (csv(X, np.repeat([1, 2], 300), names='x,id'), RATE, ID.format(302)),
     'trials that no key uses': (csv(T, X, np.repeat(range(6), 100), names='t,x,trial'), {}, "'trial': it changes"),
+    'other columns': (
+        csv(T, X, np.arange(N) % 256, (20 * Y).astype(int), T.astype(str), names='t,x,n,adc,wall'), {}, CORK,
+    ),
     'an index without a name': (
         csv(range(N), X, names=',x'), {'streams': {'signal': {'columns': ['*'], 'rate_hz': 100.0}}}, CORK,
     ),

@@ -199,10 +199,11 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
         raise InvalidData('it has no rows below the names of its columns; choose files with samples')
     columns = {name: np.concatenate([part[name] for part in parts]) for name in names}
     marked = np.concatenate(junk)
-    for name in names:
-        if columns[name].dtype.kind == 'O':  # no border is seen at a malformed row
-            last = np.maximum.accumulate(np.where(marked, np.argmin(marked), np.arange(len(marked))))
-            columns[name] = columns[name][last]
+    # A malformed row without a number is none of a sample: no border is seen there.
+    floats = [column for column in columns.values() if column.dtype.kind == 'f']
+    gone = marked & np.logical_and.reduce([np.isnan(column) for column in floats])
+    last = np.maximum.accumulate(np.where(gone, np.argmin(gone), np.arange(len(gone))))
+    columns = {name: column[last] if column.dtype.kind == 'O' else column for name, column in columns.items()}
     yield TableFrame(place, columns, lines=np.concatenate(lines), junk=marked, reasons=reasons)
 
 

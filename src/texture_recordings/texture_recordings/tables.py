@@ -53,7 +53,7 @@ SAME_TIME_S = 1e-9
 MAX_NUMBERED = 3  # columns name_1 … name_n beyond this may be samples: the mapping has to tell
 MAX_SLIDES = 20_000  # of one file
 ROWS_A_CODE = 2  # at least, of a column that may name sensors, trials or runs
-MAX_TURNS = 100  # sensors of which one row each follows the other
+MAX_TURNS, IN_TURN = 100, 0.7  # sensors in turn, and share of rows with the number of as many rows before
 # Lowest and highest mean of a slide that a tactile finger reaches, in SI units.
 PLAUSIBLE: Mapping[str, tuple[float, float]] = {
     'speed': (5e-5, 2.0), 'force': (1e-3, 100.0), 'direction': (-6.3, 6.3),
@@ -612,11 +612,14 @@ def _is_one_of(text: str, wanted: Sequence[str]) -> bool:
 def _mixed(values: AnyArray) -> int:
     """Return the first row at which texts change, or numbers in turn or blocks of counted ones; 0 if none does."""
     found, codes = np.unique(values, return_inverse=True)
-    changes = np.flatnonzero(codes[1:] != codes[:-1]) + 1
-    counted = values.dtype.kind != 'O' and len(changes) == len(found) - 1 == np.ptp(found)
-    lags = range(2, min(2 * len(found), len(codes) // 2, MAX_TURNS) + 1) if len(changes) > 0.5 * len(codes) else ()
-    in_turn = any((codes[lag:] == codes[:-lag]).mean() > 0.7 for lag in lags)
-    return int(changes[0]) if len(changes) and (values.dtype.kind == 'O' or in_turn or counted) else 0
+    changes, count = np.flatnonzero(codes[1:] != codes[:-1]) + 1, len(found)
+    if values.dtype.kind != 'O' and len(codes) < ROWS_A_CODE * count:  # a number of rows
+        return 0
+    in_blocks = values.dtype.kind == 'O' or len(changes) == count - 1 == np.ptp(found)
+    in_turn = (
+        count <= MAX_TURNS and len(changes) > 0.5 * len(codes) and (codes[count:] == codes[:-count]).mean() > IN_TURN
+    )
+    return int(changes[0]) if len(changes) and (in_blocks or in_turn) else 0
 
 
 def _mean(times: Array, values: Array, begin_s: float, end_s: float) -> float:
