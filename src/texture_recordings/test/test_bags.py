@@ -56,10 +56,7 @@ VALUES = [
     ('signal', signal()),
     ('exploration', ExplorationState(STAMP_NS, 'e1', 'linear_slide', Phase.SLIDE, 0.5, 0.1, 2.0, surface='cork')),
     ('features', FeatureVector(STAMP_NS, 'e1', 0.5, 0.1, ('f', 'g'), np.array([1.5, math.nan]), feature_set='abc')),
-    (
-        'texture',
-        TextureEstimate(STAMP_NS, 'e1', 'cork', Rejection.NOVEL, 0.9, (0.9, 0.1), True, ('cork',), 3, 0.7),
-    ),
+    ('texture', TextureEstimate(STAMP_NS, 'e1', 'cork', Rejection.NOVEL, 0.9, (0.9, 0.1), True, ('cork',), 3, 0.7)),
     ('roughness', RoughnessEstimate(STAMP_NS, 'e1', True, 3.5, 0.4)),
     ('model_info', ModelInfo(STAMP_NS, 'm', 3, ('cork', 'felt'), 'abc')),
 ]
