@@ -155,6 +155,7 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
     junk: list[AnyArray] = []
     reasons: list[str] = []
     with open_regular(path) as opened:
+        # The names of the columns, and those that the mapping wants as numbers.
         rest = _lines(opened, form)
         first = next(rest, (0, ''))
         rest = rest if form.header else chain([first], rest)
@@ -163,6 +164,7 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
         numbers = {name for one in mapping.streams.values() for name in chosen(one.columns, names)}
         numbers |= {*mapping.numbers()}
         numeric: dict[str, bool] = {}
+        # Block by block: the cells, what they are, and the rows that are malformed.
         for block in iter(lambda: list(islice(rest, BLOCK_ROWS)), []):
             take(len(block) * (len(names) + len(mapping.texts())))
             rows = [_cells(line, delimiter) for _, line in block]

@@ -51,7 +51,6 @@ LONGEST_SLIDE_S = 1800.0
 STATE_S = 0.1  # a state so often where a condition changes along a slide
 SAME_TIME_S = 1e-9
 MAX_NUMBERED = 3  # columns name_1 … name_n beyond this may be samples: the mapping has to tell
-MAX_SLIDES = 20_000  # of one file
 ROWS_A_CODE = 2  # at least, of a column that may name sensors, trials or runs
 MAX_TURNS, IN_TURN = 100, 0.7  # sensors in turn, and share of rows with the number of as many rows before
 # Lowest and highest mean of a slide that a tactile finger reaches, in SI units.
@@ -286,6 +285,7 @@ class FrameSlides:
 
     def _stream(self, name: str, params: StreamColumns) -> Stream:
         """Return the rows of a stream with their times."""
+        # Which columns are its channels.
         names, per_row = self._used[name], params.samples_per_row or 1
         group = self._group(names[0])
         if lengths := {self._group(column)[1] for column in names} - {group[1]}:
@@ -313,6 +313,7 @@ class FrameSlides:
         if self._frame.junk is not None and len(self._frame.junk) == len(bad):
             bad |= self._frame.junk
             samples[self._frame.junk] = np.nan
+        # When the rows were sampled; those without a time are left out.
         clock, time_s = params.time.column or group[0], None
         if clock:
             raw = self._frame.numbers(clock)
@@ -394,8 +395,6 @@ class FrameSlides:
             if not spans:
                 values, has = ', '.join(params.values) or 'but empty', ', '.join(sorted({*wanted.tolist()})[:5])
                 raise InvalidData(f"column '{params.column}' has none of the values {values}; it has {has}")
-        if len(spans) > MAX_SLIDES:
-            raise InvalidData(f'it has more than {MAX_SLIDES} slides; split it')
         return spans
 
     def _refuse_unused_codes(self) -> None:
