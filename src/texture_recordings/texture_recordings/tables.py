@@ -476,6 +476,8 @@ class FrameSlides:
 
     def _value(self, name: str, rows: slice, kind: str) -> str:
         """Return the one value that a column has during a slide, the last one before it where it has none."""
+        if not self._texts[name].ndim and self._texts[name][()]:
+            return str(self._texts[name])
         if name not in self._held:
             texts = self._aligned(self._texts, name)
             self._held[name] = texts[np.maximum.accumulate(np.where(texts != '', np.arange(len(texts)), 0))]
@@ -591,13 +593,14 @@ class FrameSlides:
     def _track(self, name: str, times: Array, rows: slice) -> tuple[Array, Array]:
         """Return times and known values of a condition in SI units, (n,) each; a force and a speed without sign."""
         quantity = self._mapping.conditions.get(name, Quantity())
-        if quantity.column:
-            values, given = self._aligned(self._numbers, quantity.column, rows), self._frame[quantity.column]
-            if not given.ndim and np.isnan(values).any() and str(given) != 'nan':
-                raise InvalidData(f"'{quantity.column}' is '{given}' in its name; a number is needed there")
+        if quantity.column and self._frame[quantity.column].ndim:
+            times, values = times[rows], self._aligned(self._numbers, quantity.column, rows)
         else:
-            values = np.full(rows.stop - rows.start, float(quantity.value or 'nan'))
-        times, values = times[rows][np.isfinite(values)], values[np.isfinite(values)]
+            text = str(self._frame[quantity.column]) if quantity.column else quantity.value or 'nan'
+            times, values = times[rows][:1], np.array([number_of(text)])
+            if np.isnan(values[0]) and text != 'nan':
+                raise InvalidData(f"'{quantity.column}' is '{text}' in its name; a number is needed there")
+        times, values = times[np.isfinite(values)], values[np.isfinite(values)]
         values = values * CONDITION_UNITS[name].get(quantity.unit, 1.0)
         negative = name != 'direction' and len(values) and values.mean() < 0
         return times, -values if negative else values
