@@ -177,11 +177,6 @@ class SimulatedTextures:
         true = np.array([self.grades.of(label) for label in examples.labels])
         return Answers(grades, model.calibration.window_std(stds), true, examples.labels.tolist())
 
-    def ask_both(self, model: RoughnessModel, recipe: RoughnessRecipe) -> dict[str, Answers]:
-        """Return the grades by a model of its training textures ('seen'), and of the others ('unseen')."""
-        parts = {'seen': self.grades.used_for(TRAIN), 'unseen': self.grades.used_for(TEST)}
-        return {part: self.ask(model, self.examples(recipe, textures)) for part, textures in parts.items()}
-
 
 def errors_chart(numbers: Mapping[str, Any], out: Path) -> Path:
     """Draw the error of each regressor, the means over seeds, next to the paper's."""
@@ -255,30 +250,25 @@ ONE_PERSON = 0.82  # grades from the mean of the others: 81 materials, 11 people
 
 
 def run(experiment: Experiment) -> ExperimentResult:
-    """Learn the paper's 15 textures and grade its 10 others; leave each of the 25 out."""
+    """Learn the paper's 15 textures and grade its 10 others; leave each of the 25 out.
+
+    With a search, the paper's regressors alone, with the variables found on the 15.
+    """
     simulated = SimulatedTextures(load_scene(SCENE), experiment.seed, quick=experiment.quick)
-    recipes = {name: load_roughness_recipe(recipe) for name, recipe in RECIPES.items()}
     train, test = simulated.grades.used_for(TRAIN), simulated.grades.used_for(TEST)
-    if experiment.tune:
-        return _after_search(simulated, {name: recipes[name] for name in PAPER}, experiment)
+    tuned = _searched(simulated, experiment) if experiment.tune else {}
+    recipes = {name: tuned[name].recipe if tuned else load_roughness_recipe(RECIPES[name]) for name in tuned or RECIPES}
     answers = {}
     for name, recipe in recipes.items():
         quick = _quickly(recipe, simulated)
         model = train_grades(quick, simulated.examples(quick, train), simulated.grades, name)
-        answers[name] = simulated.ask_both(model, recipe)
-        if not experiment.seed:  # 25 models of each recipe: of the first seed alone
+        parts = {'seen': train, 'unseen': test}
+        answers[name] = {part: simulated.ask(model, simulated.examples(recipe, of)) for part, of in parts.items()}
+        if not experiment.seed and not tuned:  # 25 models of each recipe: of the first seed alone
             answers[name]['left_out'] = _leave_one_out(simulated, recipe)
-    numbers: dict[str, Any] = {
-        'seed': experiment.seed,
-        'digests': digests(),
-        'paper': {name: dict(zip(COLUMNS, row, strict=True)) for name, row in PAPER.items()},
-        'one_person': ONE_PERSON,
-        'always_the_middle': {part: float(np.abs(3.0 - one.true).mean()) for part, one in answers['ours'].items()},
-        'regressors': {name: {part: one.figures() for part, one in parts.items()} for name, parts in answers.items()},
-        'findings': [finding_as_json(finding) for finding in findings(answers)],
-    }
+    charts = () if experiment.seed or tuned else (_chart(simulated.textures, answers, experiment.out),)
     return ExperimentResult(
-        name='roughness',
+        name=f'roughness{"-tuned" if tuned else ""}',
         measured=(
             f'mean absolute error in grades of single windows of {USED_S} s, {SPEED_M_S} m/s, {FORCE_N} N; '
             'windows to which a regressor gives no grade are counted apart'
@@ -288,8 +278,17 @@ def run(experiment: Experiment) -> ExperimentResult:
             f"{simulated.scans} scans each; grades: the paper's Table I, by people on the real textures"
         ),
         split=f"by texture, the paper's: {len(train)} for training, {len(test)} for test",
-        numbers=numbers,
-        charts=_charts(simulated, answers, experiment),
+        numbers={
+            'seed': experiment.seed,
+            'digests': digests(tuned=experiment.tune),
+            'paper': {name: dict(zip(COLUMNS, row, strict=True)) for name, row in PAPER.items()},
+            'one_person': ONE_PERSON,
+            'always_the_middle': {part: float(np.abs(3.0 - one.true).mean()) for part, one in answers['ANN1'].items()},
+            'regressors': {name: {part: one.figures() for part, one in of.items()} for name, of in answers.items()},
+            'tuning': {name: one.as_json() for name, one in tuned.items()},
+            'findings': [finding_as_json(finding) for finding in findings(answers)],
+        },
+        charts=charts,
     )
 
 
@@ -342,7 +341,7 @@ def _better(claim: str, first: Mapping[str, Answers], second: Mapping[str, Answe
     both = [name for name in errors[0] if name in errors[1]]
     gains = {name: round(errors[1][name] - errors[0][name], 4) for name in both}
     gain = mean_over_seeds(list(gains.values())) if len(both) > 1 else mean(np.array([*gains.values()]))
-    here = ' against '.join(f'{one[part].figures()["error"]:.2f}' for one in (first, second))
+    here = ' against '.join(f'{one[part].figures()["error"] or math.nan:.2f}' for one in (first, second))
     return Finding(claim, f'{here} grades, {len(both)} textures', gain, by_texture=gains)
 
 
@@ -350,44 +349,21 @@ SEARCHED_SCANS = 40  # of each texture, of the 200, for a search
 OF_HEADS = SearchParams()  # the paper's
 
 
-def _after_search(
-    simulated: SimulatedTextures, recipes: Mapping[str, RoughnessRecipe], experiment: Experiment
-) -> ExperimentResult:
-    """Search the variables of the paper's regressors on its 15 textures, then grade the ten unseen ones.
+def _searched(simulated: SimulatedTextures, experiment: Experiment) -> dict[str, Tuned]:
+    """Search the variables of the paper's regressors on its 15 textures; the recipes are written next to the result.
 
-    The recipes that were found are written next to the result.
+    As in the paper, each half holds windows of every texture: the search does not see how a new texture fares.
     """
-    train, test = simulated.grades.used_for(TRAIN), simulated.grades.used_for(TEST)
-    most = experiment.search or (QUICK if simulated.quick else None)
-    params = replace(OF_HEADS.within(most), seed=simulated.seed)
+    params = replace(QUICK if experiment.quick else OF_HEADS, seed=experiment.seed)
+    train = simulated.grades.used_for(TRAIN)
     scans = simulated.slides(train, min(SEARCHED_SCANS, simulated.scans), SPEED_M_S, FORCE_N)
-    # As in the paper, each half holds windows of every texture: the search does not see how a new texture fares.
-    tuned, answers = {}, {}
-    for name, recipe in recipes.items():
-        base = checkless(recipe)
+    tuned = {}
+    for name in PAPER:
+        base = checkless(load_roughness_recipe(RECIPES[name]))
         found = search(base, scans, params, grading(simulated.grades))
         tuned[name] = Tuned(varied(base, found.individual), params, {'': found}, len(scans.labels))
-    for name, one in tuned.items():
-        one.write(experiment.out / f'{RECIPES[name]}-tuned.yaml')
-        model = train_grades(
-            _quickly(one.recipe, simulated), simulated.examples(one.recipe, train), simulated.grades, name
-        )
-        answers[name] = simulated.ask_both(model, one.recipe)
-    return ExperimentResult(
-        name='roughness-tuned',
-        measured=f'mean absolute error in grades after a search of {params}, {len(scans.labels)} scans',
-        data=f'simulated: {len(simulated.textures)} surfaces, {simulated.scans} scans each',
-        split=f"by texture, the paper's: {len(train)} for training and search, {len(test)} for test",
-        numbers={
-            'seed': simulated.seed,
-            'digests': digests(tuned=True),
-            'regressors': {
-                name: {part: one.figures() for part, one in parts.items()} for name, parts in answers.items()
-            },
-            'tuning': {name: one.as_json() for name, one in tuned.items()},
-            'findings': [finding_as_json(finding) for finding in findings(answers)],
-        },
-    )
+        tuned[name].write(experiment.out / f'{RECIPES[name]}-tuned-{experiment.seed}.yaml')
+    return tuned
 
 
 def checkless(recipe: RoughnessRecipe) -> RoughnessRecipe:
@@ -428,11 +404,7 @@ def _thinned(examples: LabelledFeatures, count: int) -> LabelledFeatures:
     return _rows(examples, kept)
 
 
-def _charts(
-    simulated: SimulatedTextures,
-    answers: Mapping[str, Mapping[str, Answers]],
-    experiment: Experiment,
-) -> tuple[Any, ...]:
+def _chart(textures: Sequence[str], answers: Mapping[str, Mapping[str, Answers]], out: Path) -> Path:
     panels = {
         f'{name}: training and unseen textures': {
             'training': answers[name]['seen'].by_texture(),
@@ -440,10 +412,6 @@ def _charts(
         }
         for name in ('ANN5', 'ours')
     }
-    if 'left_out' in answers['ours']:
-        panels['ours: each texture left out in turn'] = {'unseen': answers['ours']['left_out'].by_texture()}
-    where = f'simulated, {len(simulated.textures)} textures'
-    return (
-        grades_chart(panels, simulated.textures, f'Roughness as people grade it, and as it is estimated ({where})',
-                     experiment.out / 'roughness_grades.png'),
-    )  # fmt: skip
+    panels['ours: each texture left out in turn'] = {'unseen': answers['ours']['left_out'].by_texture()}
+    title = f'Roughness as people grade it, and as it is estimated (simulated, {len(textures)} textures)'
+    return grades_chart(panels, textures, title, out / 'roughness_grades.png')

@@ -45,8 +45,7 @@ standardisation
     Here: Features have zero mean and unit variance.
 friction
     Paper: The next question (VI).
-    Here: `texture experiment friction`, simulated. Live, the recipe `friction-svm` needs the arm `ur` or
-        `ros_controllers`.
+    Here: The recipe `friction-svm`, which needs the arm `ur` or `ros_controllers`; without figures.
 """
 
 from __future__ import annotations

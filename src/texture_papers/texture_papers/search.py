@@ -5,10 +5,8 @@
 from __future__ import annotations
 
 import copy
-import math
-import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -43,13 +41,6 @@ class SearchParams:
 
     def __str__(self) -> str:
         return f'{self.population} individuals, {self.generations} generations, {self.halves} halves'
-
-    def within(self, most: SearchParams | None) -> SearchParams:
-        """Return the size, no part of it larger than that of another."""
-        if most is None:
-            return self
-        names = ('population', 'generations', 'halves')
-        return replace(self, **{name: min(getattr(self, name), getattr(most, name)) for name in names})
 
 
 QUICK = SearchParams(population=4, generations=2, halves=2)
@@ -228,11 +219,10 @@ def search(
     score: Score = recognition,
     *,
     start: Sequence[Individual] = (),
-    until_s: float = math.inf,
 ) -> Found:
     """Return the best individual by the mean of learning and test score over the halves.
 
-    Individuals of another search may be the first. TimeoutError is raised after a time of the clock `time.time`.
+    Individuals of another search may be the first.
 
     Source: Roberge et al., "Textures recognition through tactile exploration", section IV.
     """
@@ -257,8 +247,6 @@ def search(
             break
         points = [tuple(int(number) for number in point) for point in offspring.get('X')]
         for point in points:
-            if time.time() > until_s:
-                raise TimeoutError
             if point not in known:
                 known[point] = scores(point)
         offspring.set('F', np.array([[-known[point].mean()] for point in points]))
