@@ -26,7 +26,7 @@ from texture_estimation.roughness import (
 from texture_evaluation.evaluate import run_model
 from texture_evaluation.train import train_from_bags
 from texture_features.windows import CutWindow
-from texture_papers.rispal_experiment import FORCE_N, SPEED_M_S, SimulatedTextures
+from texture_papers.rispal_experiment import SimulatedTextures
 from texture_recordings.dataset import SlideDataset
 from texture_simulation.offline import SlidePlan, write_simulated
 from texture_simulation.scene import load_scene
@@ -129,13 +129,11 @@ def run_roughness(options: BenchmarkOptions) -> BenchmarkResult:
     grades = read_grades('ets_roughness')
     simulated = SimulatedTextures(load_scene('roughness'), options.seed)
     count = QUICK_SCANS if options.quick else SCANS
-    windows = [
-        event for texture in grades.used_for(TEST) for event in simulated.events(texture, count, SPEED_M_S, FORCE_N)
-    ]
+    windows = [event for texture in grades.used_for(TEST) for event in simulated.events(texture, count)]
     models = {}
     for name, recipe_name in list(ROUGHNESS_RECIPES.items())[: 1 if options.quick else None]:
         recipe = load_roughness_recipe(recipe_name)
-        examples = simulated.extract(recipe.feature_set, grades.used_for(TRAIN), count, SPEED_M_S, FORCE_N)
+        examples = simulated.extract(recipe.feature_set, grades.used_for(TRAIN), count)
         models[name] = train_grades(recipe, examples, grades)
     timed = QUICK_TIMED if options.quick else TIMED
     rounds = [{name: grading_us(model, windows, timed) for name, model in models.items()} for _ in range(ROUNDS)]

@@ -142,6 +142,17 @@ def test_two_directions_are_joined_into_one_vector_with_separate_components() ->
     assert kept[0] == kept[1] + kept[2]  # the paper: 39 and 39 make 78
 
 
+def test_an_entire_contact_is_press_slide_and_lift_in_the_time_of_a_slide() -> None:
+    entire = PROTOCOLS['jamali'].tasks[1].visits[0]
+    slides = gather(load_scene('jamali'), ('carpet_1',), (replace(entire, count=3),), 0, slow=False)
+    samples = slides.views[0].streams['signal'].samples
+    assert samples.shape == (3, 2 * 2500, 8)
+    vibration = np.abs(np.diff(samples, axis=1)).mean(axis=(0, 2))
+    press, sliding, lifted = (vibration[part].mean() for part in (slice(0, 250), slice(1250, 4000), slice(-200, None)))
+    assert lifted < 0.5 * sliding
+    assert press > lifted
+
+
 def test_every_paper_figure_is_a_share() -> None:
     methods = [method for paper in PROTOCOLS.values() for task in paper.tasks for method in task.methods]
     fractions = [value for one in methods for value in (one.paper.learning, one.paper.test, one.paper.unclassified)]
@@ -239,7 +250,7 @@ def test_recipe_learner_scene_motion_split_and_the_code_of_a_feature_each_change
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     protocol = PROTOCOLS['jamali']
-    [task] = protocol.tasks
+    task, entire = protocol.tasks
     [visits] = task.visits
     method = next(one for one in task.methods if one.name == 'jamali-amplitude')
     other = next(one for one in task.methods if one.name == 'jamali-naive-bayes-3')
@@ -249,6 +260,7 @@ def test_recipe_learner_scene_motion_split_and_the_code_of_a_feature_each_change
         digest_of_row(protocol, task, other),
         digest_of_row(replace(protocol, scene='twelve_textures'), task, method),
         digest_of_row(protocol, faster, method),
+        digest_of_row(protocol, replace(task, visits=entire.visits), method),
         digest_of_row(replace(protocol, divide=folds(5, 1)), task, method),
     ]
     assert digest_of_row(protocol, task, method) == rows[0]

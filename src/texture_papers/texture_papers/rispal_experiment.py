@@ -123,53 +123,42 @@ SPEED_M_S, FORCE_N, SCAN_S, USED_S = 0.15, 2.5, 0.7, 0.5
 
 
 class SimulatedTextures:
-    """Scans of textures, described: each texture, speed and force is simulated once."""
+    """Scans of textures, described: each texture is simulated once."""
 
     def __init__(self, scene: Scene, seed: int, *, quick: bool = False) -> None:
         self.seed, self.quick = seed, quick
         self.grades = read_grades(GRADES)
         self.textures = tuple(self.grades.grades)  # in the order of the table
-        self.scans, self.other_scans = QUICK_COUNTS if quick else COUNTS
+        self.scans, self.scans_left_out = QUICK_COUNTS if quick else COUNTS
         self._scene, self._fast = scene, find(SENSORS, scene.sensor, 'sensor model').fast
-        self._scans: dict[tuple[str, float, float, int], Array] = {}
+        self._scans: dict[tuple[str, int], Array] = {}
 
-    def extract(
-        self, features: FeatureSet, textures: Sequence[str], count: int, speed_m_s: float, force_n: float
-    ) -> LabelledFeatures:
+    def extract(self, features: FeatureSet, textures: Sequence[str], count: int) -> LabelledFeatures:
         """Return one window of this many scans over each texture."""
-        events = [event for texture in textures for event in self.events(texture, count, speed_m_s, force_n)]
+        events = [event for texture in textures for event in self.events(texture, count)]
         vectors = features.extract_many(events)
         return LabelledFeatures.from_vectors(vectors, {event.exploration_id: event.surface for event in events})
 
-    def events(self, texture: str, count: int, speed_m_s: float, force_n: float) -> Iterator[CutWindow]:
+    def events(self, texture: str, count: int) -> Iterator[CutWindow]:
         """Yield the window of each scan, USED_S long."""
-        for number, samples in enumerate(self._measured(texture, count, speed_m_s, force_n)):
-            window = Window(samples, self._fast.rate_hz, self._fast.channels, 0, speed_m_s, force_n)
-            yield CutWindow(0, f'{texture}/{number}', USED_S, USED_S, {'signal': window}, speed_m_s, force_n, texture)
+        for number, samples in enumerate(self._measured(texture, count)):
+            window = Window(samples, self._fast.rate_hz, self._fast.channels, 0, SPEED_M_S, FORCE_N)
+            yield CutWindow(0, f'{texture}/{number}', USED_S, USED_S, {'signal': window}, SPEED_M_S, FORCE_N, texture)
 
-    def _measured(self, texture: str, count: int, speed_m_s: float, force_n: float) -> Array:
-        key = texture, speed_m_s, force_n, count
-        if key not in self._scans:
+    def _measured(self, texture: str, count: int) -> Array:
+        if (texture, count) not in self._scans:
             place = list(self._scene.surfaces).index(texture)
-            rng = np.random.default_rng([self.seed, place, round(1e4 * speed_m_s), round(1e3 * force_n), count])
-            samples = simulate_slides(self._scene, texture, count, SimulatedSlide(speed_m_s, force_n, SCAN_S), rng)
-            self._scans[key] = samples[:, : round(USED_S * self._fast.rate_hz)].astype(np.float64)
-        return self._scans[key]
+            rng = np.random.default_rng([self.seed, place, round(1e4 * SPEED_M_S), round(1e3 * FORCE_N), count])
+            samples = simulate_slides(self._scene, texture, count, SimulatedSlide(SPEED_M_S, FORCE_N, SCAN_S), rng)
+            self._scans[texture, count] = samples[:, : round(USED_S * self._fast.rate_hz)].astype(np.float64)
+        return self._scans[texture, count]
 
-    def slides(self, textures: Sequence[str], count: int, speed_m_s: float, force_n: float) -> SlideArrays:
+    def slides(self, textures: Sequence[str], count: int) -> SlideArrays:
         """Return the same scans as plain arrays, for a search."""
-        samples = np.concatenate([self._measured(texture, count, speed_m_s, force_n) for texture in textures])
+        samples = np.concatenate([self._measured(texture, count) for texture in textures])
         same = np.ones(len(samples))
         streams = {'signal': ArrayStream(samples, self._fast.rate_hz)}
-        return SlideArrays(streams, np.repeat(np.array(textures), count), speed_m_s * same, force_n * same)
-
-    def examples(
-        self, recipe: RoughnessRecipe, textures: Sequence[str], speed_m_s: float = SPEED_M_S, force_n: float = FORCE_N
-    ) -> LabelledFeatures:
-        """Return scans described for a recipe; fewer at other speeds and forces than the trained ones."""
-        trained = (speed_m_s, force_n) == (SPEED_M_S, FORCE_N)
-        count = self.scans if trained else self.other_scans
-        return self.extract(recipe.feature_set, textures, count, speed_m_s, force_n)
+        return SlideArrays(streams, np.repeat(np.array(textures), count), SPEED_M_S * same, FORCE_N * same)
 
     def ask(self, model: RoughnessModel, examples: LabelledFeatures) -> Answers:
         """Return the grade of each window by a model."""
@@ -233,7 +222,7 @@ def _grade_bars(axes: Any, table: ByTexture, place: Mapping[str, int], kind: str
 
 SCENE, GRADES = 'roughness', 'ets_roughness'
 SCANS = 200
-# Scans of each texture, and those at other speeds and forces and with a texture left out.
+# Scans of each texture, and those with a texture left out.
 COUNTS, QUICK_COUNTS = (SCANS, 50), (12, 4)
 QUICK_STEP = 8  # between the textures that the paper's regressors have left out
 OURS = 'roughness'
@@ -261,9 +250,14 @@ def run(experiment: Experiment) -> ExperimentResult:
     answers = {}
     for name, recipe in recipes.items():
         quick = _quickly(recipe, simulated)
-        model = train_grades(quick, simulated.examples(quick, train), simulated.grades, name)
+        model = train_grades(
+            quick, simulated.extract(quick.feature_set, train, simulated.scans), simulated.grades, name
+        )
         parts = {'seen': train, 'unseen': test}
-        answers[name] = {part: simulated.ask(model, simulated.examples(recipe, of)) for part, of in parts.items()}
+        answers[name] = {
+            part: simulated.ask(model, simulated.extract(recipe.feature_set, of, simulated.scans))
+            for part, of in parts.items()
+        }
         if not experiment.seed and not tuned:  # 25 models of each recipe: of the first seed alone
             answers[name]['left_out'] = _leave_one_out(simulated, recipe)
     charts = () if experiment.seed or tuned else (_chart(simulated.textures, answers, experiment.out),)
@@ -310,7 +304,7 @@ def digests(*, tuned: bool = False) -> dict[str, str]:
 
 
 def _digest(simulated: SimulatedTextures, recipe: RoughnessRecipe) -> str:
-    examples = simulated.extract(recipe.feature_set, simulated.textures, 3, SPEED_M_S, FORCE_N)
+    examples = simulated.extract(recipe.feature_set, simulated.textures, 3)
     true = np.array([simulated.grades.of(label) for label in examples.labels])
     textures = np.unique(examples.labels, return_inverse=True)[1]
     definition = {key: value for key, value in recipe.as_mapping().items() if key in ('windows', 'inputs', 'regressor')}
@@ -356,7 +350,7 @@ def _searched(simulated: SimulatedTextures, experiment: Experiment) -> dict[str,
     """
     params = replace(QUICK if experiment.quick else OF_HEADS, seed=experiment.seed)
     train = simulated.grades.used_for(TRAIN)
-    scans = simulated.slides(train, min(SEARCHED_SCANS, simulated.scans), SPEED_M_S, FORCE_N)
+    scans = simulated.slides(train, min(SEARCHED_SCANS, simulated.scans))
     tuned = {}
     for name in PAPER:
         base = checkless(load_roughness_recipe(RECIPES[name]))
@@ -378,7 +372,8 @@ def checkless(recipe: RoughnessRecipe) -> RoughnessRecipe:
 
 def _leave_one_out(simulated: SimulatedTextures, recipe: RoughnessRecipe) -> Answers:
     """Return the grades of each texture by a model of all others; a quick run skips some of the paper's."""
-    examples = _thinned(simulated.examples(recipe, simulated.textures), simulated.other_scans)
+    examples = simulated.extract(recipe.feature_set, simulated.textures, simulated.scans)
+    examples = _thinned(examples, simulated.scans_left_out)
     parts = []
     for texture in simulated.textures[:: QUICK_STEP if simulated.quick and recipe.name != OURS else 1]:
         held = examples.labels == texture
