@@ -121,7 +121,7 @@ def test_a_search_sees_the_training_slides_alone_and_its_recipe_is_tried_on_the_
     found = load_recipe(str(tmp_path / 'ets-linear-svm-tuned-linear-slides-1.yaml'))
     assert all(0.01 <= pair.learner.box_constraint <= 10.0 for pair in found.learner.pairs)
     searches = (tmp_path / 'searches.jsonl').read_text()
-    assert len(searches.splitlines()) == 2 * 2 * 6  # whole scans and their parts, with each seed
+    assert len(searches.splitlines()) == 2 * 4 * 6  # SVM and ANN, whole scans and their parts, with each seed
     run_experiment('ets-linear', Experiment(tmp_path, seed=1, quick=True, tune=True))
     assert (tmp_path / 'searches.jsonl').read_text() == searches  # what is done is not searched again
 
@@ -151,12 +151,6 @@ def test_an_entire_contact_is_press_slide_and_lift_in_the_time_of_a_slide() -> N
     press, sliding, lifted = (vibration[part].mean() for part in (slice(0, 250), slice(1250, 4000), slice(-200, None)))
     assert lifted < 0.5 * sliding
     assert press > lifted
-
-
-def test_every_paper_figure_is_a_share() -> None:
-    methods = [method for paper in PROTOCOLS.values() for task in paper.tasks for method in task.methods]
-    fractions = [value for one in methods for value in (one.paper.learning, one.paper.test, one.paper.unclassified)]
-    assert all(0 <= value <= 1 for value in fractions if value is not None)
 
 
 def test_divisions_keep_to_the_papers_split() -> None:
@@ -203,15 +197,9 @@ def test_intervals_are_those_of_the_textbook() -> None:
     assert difference(values, values).value == 0
 
 
-@pytest.mark.parametrize('protocol', PROTOCOLS.values(), ids=PROTOCOLS)
-def test_what_has_no_separate_label_is_the_recipe_as_released(protocol: PaperProtocol) -> None:
-    named = [method for task in protocol.tasks for method in task.methods if not method.label]
-    for method in named:
-        released = load_recipe(method.recipe)
-        run = recipe_of(method)
-        assert run.feature_set.as_mapping() == released.feature_set.as_mapping()
-        assert (run.evidence, run.training) == (released.evidence, released.training)
-        assert run.learner == released.learner
+def test_what_has_no_separate_label_is_the_recipe_as_released() -> None:
+    methods = [method for protocol in PROTOCOLS.values() for task in protocol.tasks for method in task.methods]
+    assert not [method.name for method in methods if method.learner and not method.label]
 
 
 def numbers(seed: int, test: float, gain: float, **finding: Any) -> dict:

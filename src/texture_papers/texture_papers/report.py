@@ -173,7 +173,6 @@ def run(protocol: PaperProtocol, experiment: Experiment) -> ExperimentResult:
     found = outcomes(protocol, scene, experiment.seed, quick=experiment.quick, tuned=tuned)
     methods = {task.name: [m for m in task.methods if (task.name, m.name) in found] for task in protocol.tasks}
     slides = {task: _slides(found[task, some[0].name]) for task, some in methods.items()}
-    checked = protocol.findings(found) if not tuned else ()
     for (task, method), one in tuned.items():
         one.write(experiment.out / f'{method}{TUNED}-{task.replace(" ", "-")}-{experiment.seed}.yaml')
     return ExperimentResult(
@@ -193,7 +192,7 @@ def run(protocol: PaperProtocol, experiment: Experiment) -> ExperimentResult:
                 task: {m.name: figures_of(m, found[task, m.name], by_condition=protocol.by_condition) for m in some}
                 for task, some in methods.items()
             },
-            'findings': [finding_as_json(finding) for finding in checked],
+            'findings': [finding_as_json(finding) for finding in protocol.findings(found)],
             'tuning': {f'{task}, {method}': one.as_json() for (task, method), one in tuned.items()},
         },
     )

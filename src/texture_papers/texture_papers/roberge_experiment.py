@@ -25,6 +25,8 @@ from texture_simulation.path import SimulatedSlide
 
 # The paper's sizes; the search for parts continues from that for whole scans, and has half of the paper's halves.
 FULL, OF_PARTS, OF_TEN = SearchParams(20, 30, 20), SearchParams(10, 10, 10), SearchParams(13, 10, 20)
+# Smaller than the paper's: networks take ten times as long as machines, and those of parts hours.
+OF_NETWORKS, OF_THEIR_PARTS = SearchParams(10, 5, 4), SearchParams(10, 1, 2)
 LINEAR_S = 0.5
 LINEAR_SLIDES = 'linear slides'
 LINEAR_VISITS = tuple(
@@ -34,9 +36,9 @@ LINEAR_VISITS = tuple(
 )
 ANN, SVM, ANN_VOTE, SVM_VOTE = 'ets-linear-ann', 'ets-linear-svm', 'ets-linear-ann-vote', 'ets-linear-svm-vote'
 METHODS = (
-    Method(ANN, Figures(0.851, 0.787, 0.088)),
+    Method(ANN, Figures(0.851, 0.787, 0.088), search=OF_NETWORKS),
     Method(SVM, Figures(0.948, 0.750, 0.110), search=FULL),
-    Method(ANN_VOTE, Figures(0.849, 0.840, 0.054)),
+    Method(ANN_VOTE, Figures(0.849, 0.840, 0.054), search=OF_THEIR_PARTS, of_whole=ANN),
     Method(SVM_VOTE, Figures(0.991, 0.973, 0.016), search=OF_PARTS, of_whole=SVM),
 )
 
@@ -148,7 +150,7 @@ CIRCULAR = PaperProtocol(
             CIRCLES,
             _circular_visits(RADIUS_M),
             (
-                Method('ets-circular-ann', Figures(0.846, 0.811, 0.028)),
+                Method('ets-circular-ann', Figures(0.846, 0.811, 0.028), search=OF_NETWORKS),
                 Method('ets-circular-svm', Figures(0.990, 0.867, 0.052), search=FULL),
             ),
         ),
@@ -156,7 +158,7 @@ CIRCULAR = PaperProtocol(
             LINES,
             _circular_visits(0.0),
             (
-                Method('ets-linear-ann', Figures(0.809, 0.715, 0.142)),
+                Method('ets-linear-ann', Figures(0.809, 0.715, 0.142), search=OF_NETWORKS),
                 Method('ets-linear-svm', Figures(0.963, 0.764, 0.134), search=FULL),
             ),
         ),
@@ -197,14 +199,14 @@ FINE = PaperProtocol(
             TEN_TEXTURES,
             (Visits('0.125 m/s, 2 N', 200, SimulatedSlide(0.125, 2.0, 0.8)),),
             (
-                Method(FINE_ANN, Figures(0.963, 0.949, 0.007)),
+                Method(FINE_ANN, Figures(0.963, 0.949, 0.007), search=OF_NETWORKS),
                 Method(FINE_SVM, Figures(0.960, 0.958, 0.014), search=OF_TEN),
             ),
         ),
     ),
     divide=halves(5),
     split='5 random halves of each texture',
-    anchor=Anchor(TEN_TEXTURES, FINE_SVM, 0.958, 'table IV'),
+    anchor=Anchor(TEN_TEXTURES, FINE_SVM, 0.958, 'table IV', shortfall='0.9 points below it'),
     findings=fine_findings,
     quick_count=16,
 )
