@@ -104,6 +104,8 @@ def test_a_quick_run_of_an_experiment_without_a_protocol_shows_the_direction_too
 def test_an_experiment_whose_paper_searches_for_nothing_refuses_to_tune(name: str, tmp_path: Path) -> None:
     with pytest.raises(InvalidParameter, match=f"'{name}' has nothing to tune"):
         run_experiment(name, Experiment(tmp_path, quick=True, tune=True))
+    with pytest.raises(InvalidParameter, match='0 seeds were requested'):
+        run_experiment(name, Experiment(tmp_path, quick=True), seeds=0)
     assert not list(tmp_path.iterdir())
 
 

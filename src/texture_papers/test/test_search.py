@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.errors import InvalidData
 from texture_core.types import Window
 from texture_estimation.recipe import load_recipe
 from texture_estimation.roughness import Grades, load_roughness_recipe
@@ -177,8 +177,3 @@ def test_regressors_are_searched_by_how_near_their_grades_come(regressor: str) -
     recipe = checkless(load_roughness_recipe(f'ets-roughness-{regressor}'))
     found = search(recipe, hisses, SearchParams(12, 4, 3), grading(grades))
     assert (found.learning + found.test) / 2 > 0.7
-
-
-def test_a_search_that_is_too_small_is_refused() -> None:
-    with pytest.raises(InvalidParameter, match='population of a search is 1; it is at least 4'):
-        SearchParams(population=1)

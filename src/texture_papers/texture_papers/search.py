@@ -14,7 +14,6 @@ import numpy as np
 import yaml
 
 from texture_core.config import library, writing
-from texture_core.errors import InvalidParameter
 from texture_core.types import AnyArray, Array
 from texture_estimation.learners.learner import Codes, log_softmax, standardisation
 from texture_estimation.recipe import Recipe
@@ -32,12 +31,6 @@ class SearchParams:
     generations: int = 30
     halves: int = 20
     seed: int = 0
-
-    def __post_init__(self) -> None:
-        low = {'population': 4, 'generations': 1, 'halves': 2}
-        for name, least in low.items():
-            if (value := getattr(self, name)) < least:
-                raise InvalidParameter(f'{name} of a search is {value}; it is at least {least}')
 
     def __str__(self) -> str:
         return f'{self.population} individuals, {self.generations} generations, {self.halves} halves'

@@ -16,7 +16,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the sub-command."""
     parser.add_argument('name', help=f'one of {", ".join(EXPERIMENTS)}')
     parser.add_argument('--out', type=Path, default=Path('docs/charts'), metavar='DIR', help='folder for the results')
-    parser.add_argument('--quick', '--reduced', action='store_true', help='fewer slides; not for publishing')
+    parser.add_argument('--quick', action='store_true', help='fewer slides; not for publishing')
     parser.add_argument(
         '--tune', action='store_true', help='search the variables of each pair of textures, or of a regressor, first'
     )
