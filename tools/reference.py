@@ -207,7 +207,7 @@ def experiment(name: str, root: Path) -> str:
     numbers = content['numbers']
     if numbers.get('digests') != DIGESTS[name]():
         command = f'{name.removesuffix("-tuned")}{" --tune" if name.endswith("-tuned") else ""}'
-        return f'Not measured since something of it changed. Run `texture experiment {command} --seeds 5`.\n'
+        return f'Not measured with the present code. Run `texture experiment {command} --seeds 5`.\n'
     seeds = numbers.get('seeds', [numbers.get('seed', 0)])
     count = f'{len(seeds)} seeds' if len(seeds) > 1 else 'one seed'
     rows = [

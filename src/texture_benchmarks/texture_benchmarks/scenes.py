@@ -269,7 +269,7 @@ def with_paper(
     if name not in PAPERS:
         return dict(figures)
     protocol, method = PAPERS[name]
-    [task] = protocol.tasks
+    task, *_ = protocol.tasks
     task = replace(task, methods=tuple(one for one in task.methods if one.name == method))
 
     def right(world: Scene, number: int) -> float:

@@ -90,7 +90,7 @@ def test_the_search_writes_recipes_that_can_be_trained_and_grades_unseen_texture
     result, _ = run_experiment('roughness', Experiment(tmp_path, quick=True, tune=True))
     assert result.numbers['tuning'].keys() == result.numbers['regressors'].keys() == {'ANN1', 'ANN5', 'SVM5'}
     assert all(0 < parts['unseen']['error_none_as_0'] < 4 for parts in result.numbers['regressors'].values())
-    recipe = load_roughness_recipe(str(tmp_path / 'ets-roughness-svm5-tuned.yaml'))
+    recipe = load_roughness_recipe(str(tmp_path / 'ets-roughness-svm5-tuned-0.yaml'))
     assert 0.01 <= recipe.regressor.c <= 10.0
 
 

@@ -5,12 +5,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from texture_core.types import Array
 from texture_papers.hu import principal_components
 from texture_papers.protocol import (
     Anchor,
@@ -27,7 +25,7 @@ from texture_papers.protocol import (
     recipe_of,
 )
 from texture_papers.report import better_on, built_in, digests, finding_as_json, higher
-from texture_papers.slides import Slides, View, Visits, gather
+from texture_papers.slides import View, Visits, gather
 from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import load_scene
 
@@ -36,14 +34,13 @@ PAPER = 39  # components of one linen in one direction
 SLIDE_S = 3.0
 BOTH, ONE = 'hu-pca-svm-xy', 'hu-pca-svm'
 X_ONLY, Y_ONLY = f'{ONE}, x alone', f'{ONE}, y alone'
-LOG, POWER, OF_PAPER = f'{BOTH}, logarithm', f'{BOTH}, power', f'{BOTH}, 39 + 39 components'
+OF_PAPER = f'{BOTH}, 39 + 39 components'
 ALONG_X_AND_Y = (View(), View(turned_rad=math.pi / 2))
 
 
 def findings(outcomes: MethodResults) -> list[Finding]:
     """Check the claims of section 5."""
     both, x_only, y_only = (outcomes[TASK, name] for name in (BOTH, X_ONLY, Y_ONLY))
-    log, power = (outcomes[TASK, name] for name in (LOG, POWER))
     return [
         *built_in(
             'linen 1 alone differs between x and y',
@@ -51,8 +48,6 @@ def findings(outcomes: MethodResults) -> list[Finding]:
         ),
         higher('x and y joined are better than x alone', both, x_only),
         higher('x and y joined are better than y alone', both, y_only),
-        higher('not of the paper: magnitudes distinguish better than powers', both, power),
-        higher('not of the paper: magnitudes distinguish better than their logarithm', both, log),
     ]
 
 
@@ -68,8 +63,6 @@ PROTOCOL = PaperProtocol(
                 Method(BOTH, Figures(test=0.92)),
                 Method(ONE, label=X_ONLY, views=(0,)),
                 Method(ONE, label=Y_ONLY, views=(1,)),
-                Method(BOTH, features={'texture_papers.hu:Spectrum': {'scale': 'power'}}, label=POWER),
-                Method(BOTH, features={'texture_papers.hu:Spectrum': {'scale': 'log'}}, label=LOG),
                 Method(BOTH, learner={'components': PAPER}, label=OF_PAPER),
             ),
         ),
@@ -88,67 +81,37 @@ PROTOCOL = PaperProtocol(
 )
 
 
-NAME = 'hu-components'
-COMPONENT_METHODS = {'magnitude': BOTH, 'power': POWER, 'logarithm': LOG}
-DIRECTIONS = ('x', 'y')
 QUICK = ('linen_2', 'linen_3')  # fewer slides could not have 39 components
-Counts = Mapping[str, Mapping[str, Mapping[str, int]]]  # by scale, direction and linen
 
 
 def run_components(experiment: Experiment) -> ExperimentResult:
-    """Count the components of each linen in each direction, of magnitudes, powers and their logarithms."""
+    """Count the components that explain 99 % of the variance of the slides over each linen in each direction."""
     [task] = PROTOCOL.tasks
     task = replace(task, surfaces=QUICK) if experiment.quick else task
     slides = gather(load_scene(PROTOCOL.scene), task.surfaces, task.visits, experiment.seed, slow=False)
-    counts = {scale: components(slides, method) for scale, method in COMPONENT_METHODS.items()}
+    recipe = recipe_of(task.methods[0])
+    values, owner = slides.extract(recipe.feature_set)
+    counts: dict[str, dict[str, int]] = {}
+    for direction, part in zip(('x', 'y'), np.split(values, 2, axis=1), strict=True):
+        centred = part - part.mean(axis=1, keepdims=True)  # the mean of each example, eq. 7
+        counts[direction] = {
+            linen: principal_components(centred[slides.codes[owner] == code], recipe.learner.variance).shape[1]  # type: ignore[attr-defined]  # of SvmMaxWins
+            for code, linen in enumerate(slides.surfaces)
+        }
+    found = np.array([count for of_linen in counts.values() for count in of_linen.values()])
+    here = f'{found.mean():.1f} components, {found.min()} to {found.max()}'
     return ExperimentResult(
-        name=NAME,
+        name='hu-components',
         measured='principal components that hold 99 % of the variance of the slides over one linen in one direction',
         data=f"simulated: scene '{PROTOCOL.scene}', {task.visits[0].count} slides of each linen along x and along y",
         split='none: components are sought on all slides over one linen',
         numbers={
             'seed': experiment.seed,
-            'digests': component_digests(),
+            'digests': digests(PROTOCOL),
             'paper': PAPER,
             'components': counts,
-            'findings': [finding_as_json(finding) for finding in component_findings(counts)],
+            'findings': [
+                finding_as_json(Finding(f'one linen takes {PAPER} components or more', here, mean(found - PAPER)))
+            ],
         },
     )
-
-
-def components(slides: Slides, method: str) -> Mapping[str, Mapping[str, int]]:
-    """Return by direction and linen how many components the recipe of a method of the experiment keeps of one linen."""
-    recipe = recipe_of(next(one for one in PROTOCOL.tasks[0].methods if one.name == method))
-    values, owner = slides.extract(recipe.feature_set)
-    ratio = recipe.learner.variance  # type: ignore[attr-defined]  # of SvmMaxWins
-    return {
-        direction: {linen: kept(part[slides.codes[owner] == code], ratio) for code, linen in enumerate(slides.surfaces)}
-        for direction, part in zip(DIRECTIONS, np.split(values, len(DIRECTIONS), axis=1), strict=True)
-    }
-
-
-def kept(values: Array, ratio: float) -> int:
-    """Return how many components explain a fraction of the variance, the mean of each example subtracted (eq. 7)."""
-    return principal_components(values - values.mean(axis=1, keepdims=True), ratio).shape[1]
-
-
-def component_digests() -> dict[str, str]:
-    """Return the digests of the experiment as they are now."""
-    return digests(PROTOCOL)
-
-
-def component_findings(counts: Counts) -> list[Finding]:
-    """Check the 39 components of the paper with each reading of its spectrum, over linens and directions."""
-    found = {scale: np.array([[*of.values()] for of in parts.values()]).ravel() for scale, parts in counts.items()}
-    distances = {scale: np.abs(values - PAPER) for scale, values in found.items()}
-    return [
-        *(_component_finding(f'one linen takes {PAPER} components or more: {scale}', values - PAPER, values)
-          for scale, values in found.items()),
-        *(_component_finding(f'not of the paper: magnitudes are nearer to its {PAPER} components than the {other}',
-                             distances[other] - distances['magnitude'], found[other])
-          for other in ('power', 'logarithm')),
-    ]  # fmt: skip
-
-
-def _component_finding(claim: str, difference: Array, values: Array) -> Finding:
-    return Finding(claim, f'{values.mean():.1f} components, {values.min()} to {values.max()}', mean(difference))

@@ -27,7 +27,6 @@ from texture_papers.protocol import (
     mean,
     recipe_of,
     reduced,
-    training_in,
     wilson,
 )
 from texture_papers.report import at_least, built_in, digests, higher, kept_in, most_errors, right_of
@@ -128,7 +127,7 @@ PROTOCOL = PaperProtocol(
         RecognitionTask(name, VISITS, (*_methods(svm, em), *(ONLINE if name == ALL else ())), surfaces)
         for name, svm, em, surfaces in zip(TASKS, PAPER_SVM, PAPER_EM, SURFACES, strict=True)
     ),
-    divide=training_in(TRAINED),
+    divide=TRAINED,
     split='training: 10 slides with index and middle finger; test: 20 with thumb and index finger',
     anchor=None,
     findings=findings,
@@ -177,18 +176,8 @@ SHAPES = PaperProtocol(
     name='kaboli-shapes',
     scene='kaboli_shapes',
     paper='Kaboli et al. 2015, "In-hand object recognition via texture properties", section VI',
-    tasks=(
-        RecognitionTask(
-            ALL,
-            SHAPE_VISITS,
-            (
-                Method(SVM),
-                Method(PA),
-                Method(EM),
-            ),
-        ),
-    ),
-    divide=training_in(SHAPE_TRAINED),
+    tasks=(RecognitionTask(ALL, SHAPE_VISITS, (Method(SVM), Method(PA), Method(EM))),),
+    divide=SHAPE_TRAINED,
     split='training: 10 slides with index and middle finger; test: 5 under each condition',
     anchor=None,
     findings=shape_findings,
@@ -235,7 +224,7 @@ def run_online(experiment: Experiment) -> ExperimentResult:
         split='training: 10 slides with index and middle finger; test: 20 with thumb and index finger',
         numbers={
             'seed': experiment.seed,
-            'digests': online_digests(),
+            'digests': digests(PROTOCOL),
             'tasks': tasks,
             'forgotten': round(lost, 4),
             'update_us': round(1e6 * float(np.median(taken_s)), 1),
@@ -249,8 +238,3 @@ def _right(learner: Any, parameters: Mapping[str, Any], X: Array, y: Codes, test
     known = len(parameters['planes'])
     kinds = {'old objects': tested & (y < OLD), 'new objects': tested & (y >= OLD)}
     return {kind: wilson(right[rows]) for kind, rows in kinds.items() if known > OLD or kind == 'old objects'}
-
-
-def online_digests() -> dict[str, str]:
-    """Return the digests of the experiment as they are now."""
-    return digests(PROTOCOL)

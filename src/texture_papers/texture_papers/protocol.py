@@ -10,32 +10,30 @@ import math
 import os
 import platform
 import re
-import shutil
-import tempfile
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib.metadata import version
 from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from joblib import Parallel, delayed
 from numpy.typing import NDArray
 from scipy.stats import t
 from sklearn.model_selection import BaseCrossValidator, RepeatedStratifiedKFold, ShuffleSplit, StratifiedShuffleSplit
 
-from texture_core.errors import InvalidParameter, UnknownName
+from texture_core.errors import UnknownName
 from texture_core.types import AnyArray, Array
 from texture_estimation.learners.learner import Codes, of_examples
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.roughness import load_roughness_recipe
-from texture_features.feature_set import InputFeatures
 from texture_papers.roberge import UNDECIDED, decided_by_slide, fitted_predictor
-from texture_papers.search import Found, Individual, SearchParams, Tuned, search, tuned_pairs
-from texture_papers.slides import Mask, SlideArrays, Slides, Visits, gather, kinds_of
+from texture_papers.search import QUICK, Found, SearchParams, Tuned, search, tuned_pairs
+from texture_papers.slides import Mask, Slides, Visits, gather, kinds_of
 from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import Scene, load_scene
 
@@ -165,8 +163,8 @@ class MethodResult:
         return (events & ~self.trained_on).sum(axis=0)[chosen] / times
 
 
-# (surface and condition of each slide, randomness, whether to hurry) -> which slides are used for training, by split
-Splitter = Callable[[Codes, NDArray[np.str_], np.random.Generator, bool], Mask]
+# What of scikit-learn makes the splits, given `random_state`; or the condition whose slides are all that is trained on.
+Splitter = Callable[..., BaseCrossValidator] | str
 
 
 @dataclass(frozen=True)
@@ -188,7 +186,6 @@ class Method:
     recipe: str
     paper: Figures = Figures()
     learner: Mapping[str, Any] = field(default_factory=dict)
-    features: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     label: str = ''
     views: tuple[int, ...] = ()
     training: str = BY_SPLIT
@@ -262,57 +259,36 @@ class PaperProtocol:
 
 def halves(count: int) -> Splitter:
     """Return what draws random halves, each surface halved."""
-    return _of(lambda quick, seed: StratifiedShuffleSplit(2 if quick else count, train_size=0.5, random_state=seed))
-
-
-def _of(make: Callable[[bool, int], BaseCrossValidator]) -> Splitter:
-    """Return the splits of one of scikit-learn's splitters, as which slides each trains on."""
-
-    def divide(codes: Codes, conditions: NDArray[np.str_], rng: np.random.Generator, quick: bool) -> Mask:
-        parts = list(make(quick, int(rng.integers(2**31))).split(codes, codes))
-        trained_on = np.zeros((len(parts), len(codes)), dtype=bool)
-        for row, (training, _) in zip(trained_on, parts, strict=True):
-            row[training] = True
-        return trained_on
-
-    return divide
+    return partial(StratifiedShuffleSplit, count, train_size=0.5)
 
 
 def folds(count: int, repeats: int) -> Splitter:
     """Return what holds out each part of the slides in turn, each surface assigned at random, several times."""
-
-    def splitter(quick: bool, seed: int) -> BaseCrossValidator:
-        return RepeatedStratifiedKFold(
-            n_splits=2 if quick else count, n_repeats=1 if quick else repeats, random_state=seed
-        )
-
-    return _of(splitter)
+    return partial(RepeatedStratifiedKFold, n_splits=count, n_repeats=repeats)
 
 
 def drawn(fraction: float, count: int) -> Splitter:
     """Return what draws this fraction of all slides for training, whatever their surface."""
-    return _of(lambda quick, seed: ShuffleSplit(2 if quick else count, train_size=fraction, random_state=seed))
+    return partial(ShuffleSplit, count, train_size=fraction)
 
 
-def training_in(condition: str) -> Splitter:
-    """Return what is trained on the slides of one condition and tests on all others."""
-
-    def divide(codes: Codes, conditions: NDArray[np.str_], rng: np.random.Generator, quick: bool) -> Mask:
-        return (conditions == condition)[None, :]
-
-    return divide
+def divided(splitter: Splitter, codes: Codes, conditions: NDArray[np.str_], seed: int) -> Mask:
+    """Return which slides each split trains on, (n_splits, n_slides), of the surface and condition of each slide."""
+    if isinstance(splitter, str):
+        return (conditions == splitter)[None, :]
+    splits = splitter(random_state=int(np.random.default_rng(seed).integers(2**31))).split(codes, codes)
+    return np.array([np.isin(np.arange(len(codes)), training) for training, _ in splits])
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """Where an experiment writes, its seed, and whether to hurry."""
+    """Where an experiment writes, its seed, whether to hurry, whether to search, and on how many cores."""
 
     out: Path
     seed: int = 0
     quick: bool = False
     tune: bool = False
-    search: SearchParams | None = None
-    found: Mapping[PairSearch, Found] = field(default_factory=dict)
+    jobs: int = 1
 
 
 @dataclass(frozen=True)
@@ -414,7 +390,7 @@ def digest_of_row(protocol: PaperProtocol, task: RecognitionTask, method: Method
     """
     recipe = recipe_of(method)
     surfaces = task.surfaces or tuple(load_scene(protocol.scene).surfaces)
-    trained_on = protocol.divide(*kinds_of(surfaces, task.visits, 0), np.random.default_rng(0), False)
+    trained_on = divided(protocol.divide, *kinds_of(surfaces, task.visits, 0), 0)
     few, levels = probe(protocol.scene, surfaces, task.visits, slow=SLOW in recipe.feature_set.topics)
     half = np.array([np.count_nonzero(few.codes[:place] == code) % 2 == 0 for place, code in enumerate(few.codes)])
     with warnings.catch_warnings():
@@ -518,70 +494,48 @@ def of_task(
         yield method.name, evaluate_method(recipe, slides, splits, method.views, training=method.training)
 
 
-@dataclass(frozen=True)
-class PairSearch:
-    """A search for the variables of one pair of textures: what names it in the file of those that are done."""
-
-    protocol: str
-    task: str
-    method: str
-    after: str  # the method with whose individuals it begins, if any
-    pair: tuple[str, ...]
-    params: SearchParams
-    quick: bool
-    digest: str  # of the row of figures
-
-    @property
-    def kind(self) -> tuple[str, str, tuple[str, ...], int]:
-        """What must be equal in another search that begins with its individuals."""
-        return self.task, self.method, self.pair, self.params.seed
-
-
-def pair_searches(protocol: PaperProtocol, experiment: Experiment) -> Iterator[PairSearch]:
-    """Yield the searches of one seed."""
-    for task in protocol.tasks:
-        pairs = list(combinations(sorted(task.surfaces or load_scene(protocol.scene).surfaces), 2))
-        for method in task.methods:
-            if method.search:
-                params = replace(method.search.within(experiment.search), seed=experiment.seed)
-                digest = digest_of_row(protocol, task, method, tuned=True)
-                for pair in pairs:
-                    names = (protocol.name, task.name, method.name, method.of_whole)
-                    yield PairSearch(*names, pair, params, experiment.quick, digest)
-
-
-def search_pair(protocol: PaperProtocol, wanted: PairSearch, start: Sequence[Individual], until_s: float) -> Found:
-    """Return the variables found for one pair on what the first split is trained on."""
-    task = next(one for one in protocol.tasks if one.name == wanted.task)
-    method = next(one for one in task.methods if one.name == wanted.method)
-    scans = _training_scans(protocol, task, wanted.params.seed, quick=wanted.quick)
-    scans = scans.of(np.isin(scans.labels, wanted.pair))
-    return search(recipe_of(method), scans, wanted.params, start=start, until_s=until_s)
-
-
-def _training_scans(protocol: PaperProtocol, task: RecognitionTask, seed: int, *, quick: bool) -> SlideArrays:
-    """Return what the first split is trained on; the last is kept, as one is searched pair by pair."""
-    key = (protocol.name, task.name, seed, quick)
-    if key not in _TRAINING:
-        slides, trained_on = _gathered(protocol, task, load_scene(protocol.scene), seed, quick=quick)
-        _TRAINING.clear()
-        _TRAINING[key] = slides.views[0].of(trained_on[0])
-    return _TRAINING[key]
-
-
-_TRAINING: dict[tuple[str, str, int, bool], SlideArrays] = {}
+SEARCHES = 'searches.jsonl'
 
 
 def searched(protocol: PaperProtocol, experiment: Experiment) -> TunedRecipes:
-    """Return the recipes with variables for each pair, of the searches that are done."""
-    recipes = {(task.name, m.name): recipe_of(m) for task in protocol.tasks for m in task.methods if m.search}
-    wanted = list(pair_searches(protocol, experiment))
+    """Return the recipes with variables for each pair of textures, searched on what the first split is trained on.
+
+    Each search is a line of a file in the folder of the results, written when it is done: another call continues there.
+    """
+    path = experiment.out / SEARCHES
+    path.parent.mkdir(parents=True, exist_ok=True)
+    lines = path.read_text(encoding='utf-8').splitlines() if path.is_file() else []
+    done = {line['search']: Found(**line['found']) for line in map(json.loads, lines)}
     tuned = {}
-    for key, recipe in recipes.items():
-        group = [one for one in wanted if (one.task, one.method) == key]
-        task = next(one for one in protocol.tasks if one.name == key[0])
-        scans = len(_training_scans(protocol, task, experiment.seed, quick=experiment.quick).labels)
-        tuned[key] = tuned_pairs(recipe, group[0].params, {one.pair: experiment.found[one] for one in group}, scans)
+    for task in protocol.tasks:
+        slides, trained_on = _gathered(
+            protocol, task, load_scene(protocol.scene), experiment.seed, quick=experiment.quick
+        )
+        scans = slides.views[0].of(trained_on[0])
+        of_pair = {pair: scans.of(np.isin(scans.labels, pair)) for pair in combinations(sorted(slides.surfaces), 2)}
+        found: dict[str, dict[tuple[str, ...], Found]] = {'': {}}
+        for method in task.methods:
+            if not method.search:
+                continue
+            params = replace(QUICK if experiment.quick else method.search, seed=experiment.seed)
+            digest = digest_of_row(protocol, task, method, tuned=True)
+            names = {
+                pair: f'{protocol.name}, {task.name}, {method.name}, {pair}, {params!r}, {digest}' for pair in of_pair
+            }
+            due = [pair for pair, name in names.items() if name not in done]
+            # The search for parts begins with the best of that for whole scans.
+            begun = {pair: one.best for pair, one in found[method.of_whole].items()}
+            calls = [
+                delayed(search)(recipe_of(method), of_pair[pair], params, start=begun.get(pair, ())) for pair in due
+            ]
+            for pair, one in zip(due, Parallel(n_jobs=experiment.jobs, return_as='generator')(calls), strict=True):
+                done[names[pair]] = one
+                with path.open('a', encoding='utf-8') as file:
+                    file.write(json.dumps({'search': names[pair], 'found': asdict(one)}) + '\n')
+            found[method.name] = {pair: done[name] for pair, name in names.items()}
+            tuned[task.name, method.name] = tuned_pairs(
+                recipe_of(method), params, found[method.name], len(scans.labels)
+            )
     return tuned
 
 
@@ -592,24 +546,14 @@ def _gathered(
     task = reduced(task, protocol.quick_count) if quick else task
     slow = any(SLOW in recipe_of(method).feature_set.topics for method in task.methods)
     slides = gather(scene, task.surfaces, task.visits, seed, slow=slow)
-    return slides, protocol.divide(slides.codes, slides.conditions, np.random.default_rng(seed), quick)
+    return slides, divided(protocol.divide, slides.codes, slides.conditions, seed)
 
 
 def recipe_of(method: Method) -> Recipe:
     """Return the recipe as the protocol defines it."""
     recipe = load_recipe(method.recipe)
-    inputs = tuple(_changed(item, method.features) for item in recipe.feature_set.inputs)
     learner: Any = recipe.learner
-    return replace(
-        recipe,
-        feature_set=replace(recipe.feature_set, inputs=inputs),
-        learner=replace(learner, **method.learner),
-    )
-
-
-def _changed(item: InputFeatures, parameters: Mapping[str, Mapping[str, Any]]) -> InputFeatures:
-    features: list[tuple[str, Any]] = list(item.features)
-    return replace(item, features=tuple((name, replace(one, **parameters.get(name, {}))) for name, one in features))
+    return replace(recipe, learner=replace(learner, **method.learner))
 
 
 def evaluate_method(
@@ -619,14 +563,11 @@ def evaluate_method(
     views: Sequence[int] = (),
     *,
     training: str = BY_SPLIT,
-    more: Array | None = None,
 ) -> MethodResult:
-    """Learn from the slides of each split and evaluate all; `more` are features of each slide, (n_slides, n)."""
+    """Learn from the slides of each split and evaluate all."""
     to_learn = replace(recipe.feature_set, windows=recipe.training_windows)
     trained, owner = slides.extract(to_learn, views)
-    tested_values, slide = slides.extract(recipe.feature_set, views)
-    if more is not None:
-        trained, tested_values = np.hstack((trained, more[owner])), np.hstack((tested_values, more[slide]))
+    tested_values, _ = slides.extract(recipe.feature_set, views)
     learner = of_examples(recipe.learner, slides.names(to_learn, views), slides.surfaces)
     windows = recipe.feature_set.windows
     rows_of = trained_on[:, owner] if training == BY_SPLIT else np.ones((1, len(owner)), dtype=bool)
@@ -651,37 +592,6 @@ def reduced(task: RecognitionTask, count: int) -> RecognitionTask:
 
 LEVEL = 0.95
 VERDICTS = {True: 'holds', False: 'does not hold', None: 'not decided'}
-
-
-def over_seeds(run: Run, name: str, experiment: Experiment, count: int, digests: Mapping[str, str]) -> ExperimentResult:
-    """Run an experiment with this many seeds, each alike, and add means and intervals over them to the first's result.
-
-    Each seed is kept in the folder `seeds`; what is there already, with the present digests, is not run again.
-    """
-    if count < 2:
-        raise InvalidParameter(f'{count} seeds were requested; two or more are needed for an interval over seeds')
-    seeds = [replace(experiment, seed=experiment.seed + number) for number in range(count)]
-    first, *others = [_kept(run, name, one, digests) for one in seeds]
-    return replace(first, numbers=with_seeds(first.numbers, [one.numbers for one in others]))
-
-
-def _kept(run: Run, name: str, experiment: Experiment, digests: Mapping[str, str]) -> ExperimentResult:
-    """Return the result of one seed, from the folder if it is there with these digests and this size of a search."""
-    kind = f'{"-tuned" if experiment.tune else ""}-{experiment.seed}{"-reduced" if experiment.quick else ""}'
-    path = experiment.out / 'seeds' / f'{name}{kind}.json'
-    if path.is_file():
-        content = json.loads(path.read_text(encoding='utf-8'))
-        if (content['numbers'].get('digests'), content.get('search')) == (dict(digests), str(experiment.search)):
-            texts = {key: content[key] for key in ('name', 'measured', 'data', 'split', 'numbers')}
-            return ExperimentResult(**texts)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory() as folder:
-        result = run(replace(experiment, out=Path(folder)))
-        for recipe in Path(folder).glob('*.yaml'):
-            shutil.copy(recipe, path.with_name(f'{recipe.stem}-{experiment.seed}.yaml'))
-    content = {**asdict(replace(result, charts=())), 'search': str(experiment.search)}
-    path.write_text(json.dumps(content, ensure_ascii=False) + '\n', encoding='utf-8')
-    return result
 
 
 def with_seeds(first: Mapping[str, Any], others: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

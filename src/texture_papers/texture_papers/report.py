@@ -171,34 +171,30 @@ def run(protocol: PaperProtocol, experiment: Experiment) -> ExperimentResult:
     scene = load_scene(protocol.scene)
     tuned = searched(protocol, experiment) if experiment.tune else NONE
     found = outcomes(protocol, scene, experiment.seed, quick=experiment.quick, tuned=tuned)
-    name = f'{protocol.name}{TUNED if tuned else ""}'
     methods = {task.name: [m for m in task.methods if (task.name, m.name) in found] for task in protocol.tasks}
     slides = {task: _slides(found[task, some[0].name]) for task, some in methods.items()}
-    checked = protocol.findings(found) if not tuned else ()
-    numbers = {
-        'seed': experiment.seed,
-        'digests': digests(protocol, tuned=experiment.tune),
-        **({'reduced': True} if experiment.quick else {}),
-        'difficulty': _difficulty(protocol, found, tuned=experiment.tune),
-        'tasks': {
-            task: {m.name: figures_of(m, found[task, m.name], by_condition=protocol.by_condition) for m in some}
-            for task, some in methods.items()
-        },
-        'findings': [finding_as_json(finding) for finding in checked],
-        'tuning': {f'{task}, {method}': one.as_json() for (task, method), one in tuned.items()},
-    }
     for (task, method), one in tuned.items():
-        one.write(experiment.out / f'{method}{TUNED}-{task.replace(" ", "-")}.yaml')
+        one.write(experiment.out / f'{method}{TUNED}-{task.replace(" ", "-")}-{experiment.seed}.yaml')
     return ExperimentResult(
-        name=name,
+        name=f'{protocol.name}{TUNED if tuned else ""}',
         measured=f'slides recognised, as in {protocol.paper}; intervals of 95 % over slides',
         data=(
             f"simulated: scene '{scene.name}' ({scene.about}); "
             f'slides a surface: {", ".join(f"{count} ({name})" for name, count in slides.items())}'
         ),
         split=f'{protocol.split}{SEARCHED if tuned else ""}',
-        numbers=numbers,
-        charts=() if tuned else charts_of(protocol, numbers, name, experiment.out),
+        numbers={
+            'seed': experiment.seed,
+            'digests': digests(protocol, tuned=experiment.tune),
+            **({'reduced': True} if experiment.quick else {}),
+            'difficulty': _difficulty(protocol, found, tuned=experiment.tune),
+            'tasks': {
+                task: {m.name: figures_of(m, found[task, m.name], by_condition=protocol.by_condition) for m in some}
+                for task, some in methods.items()
+            },
+            'findings': [finding_as_json(finding) for finding in protocol.findings(found)],
+            'tuning': {f'{task}, {method}': one.as_json() for (task, method), one in tuned.items()},
+        },
     )
 
 
@@ -278,9 +274,8 @@ def finding_as_json(finding: Finding) -> dict[str, Any]:
     }
 
 
-def charts_of(protocol: PaperProtocol, numbers: Mapping[str, Any], name: str, out: Path) -> tuple[Path, ...]:
+def charts_of(protocol: PaperProtocol, numbers: Mapping[str, Any], name: str, out: Path) -> Path:
     """Draw the figures of an experiment's JSON: the means over seeds with their intervals, where there are several."""
-    stem = f'experiment_{name.replace("-", "_")}'
     panels: dict[str, dict[str, tuple[float | None, Interval]]] = {}
     for task in protocol.tasks:
         panels[task.name] = {}
@@ -289,9 +284,8 @@ def charts_of(protocol: PaperProtocol, numbers: Mapping[str, Any], name: str, ou
             panels[task.name][method.name] = (method.paper.test, _interval(figures))
             for part, cell in figures.get('sets', {}).items():
                 panels[task.name][f'{method.name}: {part}'] = (None, _interval(cell))
-    return (
-        figures_chart(panels, f'{name}: slides recognised, paper and simulation', out / f'{stem}.png', drawn(numbers)),
-    )
+    path = out / f'experiment_{name.replace("-", "_")}.png'
+    return figures_chart(panels, f'{name}: slides recognised, paper and simulation', path, drawn(numbers))
 
 
 def drawn(numbers: Mapping[str, Any]) -> str:

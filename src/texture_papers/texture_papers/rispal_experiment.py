@@ -123,64 +123,48 @@ SPEED_M_S, FORCE_N, SCAN_S, USED_S = 0.15, 2.5, 0.7, 0.5
 
 
 class SimulatedTextures:
-    """Scans of textures, described: each texture, speed and force is simulated once."""
+    """Scans of textures, described: each texture is simulated once."""
 
     def __init__(self, scene: Scene, seed: int, *, quick: bool = False) -> None:
         self.seed, self.quick = seed, quick
         self.grades = read_grades(GRADES)
         self.textures = tuple(self.grades.grades)  # in the order of the table
-        self.scans, self.other_scans = QUICK_COUNTS if quick else COUNTS
+        self.scans, self.scans_left_out = QUICK_COUNTS if quick else COUNTS
         self._scene, self._fast = scene, find(SENSORS, scene.sensor, 'sensor model').fast
-        self._scans: dict[tuple[str, float, float, int], Array] = {}
+        self._scans: dict[tuple[str, int], Array] = {}
 
-    def extract(
-        self, features: FeatureSet, textures: Sequence[str], count: int, speed_m_s: float, force_n: float
-    ) -> LabelledFeatures:
+    def extract(self, features: FeatureSet, textures: Sequence[str], count: int) -> LabelledFeatures:
         """Return one window of this many scans over each texture."""
-        events = [event for texture in textures for event in self.events(texture, count, speed_m_s, force_n)]
+        events = [event for texture in textures for event in self.events(texture, count)]
         vectors = features.extract_many(events)
         return LabelledFeatures.from_vectors(vectors, {event.exploration_id: event.surface for event in events})
 
-    def events(self, texture: str, count: int, speed_m_s: float, force_n: float) -> Iterator[CutWindow]:
+    def events(self, texture: str, count: int) -> Iterator[CutWindow]:
         """Yield the window of each scan, USED_S long."""
-        for number, samples in enumerate(self._measured(texture, count, speed_m_s, force_n)):
-            window = Window(samples, self._fast.rate_hz, self._fast.channels, 0, speed_m_s, force_n)
-            yield CutWindow(0, f'{texture}/{number}', USED_S, USED_S, {'signal': window}, speed_m_s, force_n, texture)
+        for number, samples in enumerate(self._measured(texture, count)):
+            window = Window(samples, self._fast.rate_hz, self._fast.channels, 0, SPEED_M_S, FORCE_N)
+            yield CutWindow(0, f'{texture}/{number}', USED_S, USED_S, {'signal': window}, SPEED_M_S, FORCE_N, texture)
 
-    def _measured(self, texture: str, count: int, speed_m_s: float, force_n: float) -> Array:
-        key = texture, speed_m_s, force_n, count
-        if key not in self._scans:
+    def _measured(self, texture: str, count: int) -> Array:
+        if (texture, count) not in self._scans:
             place = list(self._scene.surfaces).index(texture)
-            rng = np.random.default_rng([self.seed, place, round(1e4 * speed_m_s), round(1e3 * force_n), count])
-            samples = simulate_slides(self._scene, texture, count, SimulatedSlide(speed_m_s, force_n, SCAN_S), rng)
-            self._scans[key] = samples[:, : round(USED_S * self._fast.rate_hz)].astype(np.float64)
-        return self._scans[key]
+            rng = np.random.default_rng([self.seed, place, round(1e4 * SPEED_M_S), round(1e3 * FORCE_N), count])
+            samples = simulate_slides(self._scene, texture, count, SimulatedSlide(SPEED_M_S, FORCE_N, SCAN_S), rng)
+            self._scans[texture, count] = samples[:, : round(USED_S * self._fast.rate_hz)].astype(np.float64)
+        return self._scans[texture, count]
 
-    def slides(self, textures: Sequence[str], count: int, speed_m_s: float, force_n: float) -> SlideArrays:
+    def slides(self, textures: Sequence[str], count: int) -> SlideArrays:
         """Return the same scans as plain arrays, for a search."""
-        samples = np.concatenate([self._measured(texture, count, speed_m_s, force_n) for texture in textures])
+        samples = np.concatenate([self._measured(texture, count) for texture in textures])
         same = np.ones(len(samples))
         streams = {'signal': ArrayStream(samples, self._fast.rate_hz)}
-        return SlideArrays(streams, np.repeat(np.array(textures), count), speed_m_s * same, force_n * same)
-
-    def examples(
-        self, recipe: RoughnessRecipe, textures: Sequence[str], speed_m_s: float = SPEED_M_S, force_n: float = FORCE_N
-    ) -> LabelledFeatures:
-        """Return scans described for a recipe; fewer at other speeds and forces than the trained ones."""
-        trained = (speed_m_s, force_n) == (SPEED_M_S, FORCE_N)
-        count = self.scans if trained else self.other_scans
-        return self.extract(recipe.feature_set, textures, count, speed_m_s, force_n)
+        return SlideArrays(streams, np.repeat(np.array(textures), count), SPEED_M_S * same, FORCE_N * same)
 
     def ask(self, model: RoughnessModel, examples: LabelledFeatures) -> Answers:
         """Return the grade of each window by a model."""
         grades, stds = model.grade(examples.values)
         true = np.array([self.grades.of(label) for label in examples.labels])
         return Answers(grades, model.calibration.window_std(stds), true, examples.labels.tolist())
-
-    def ask_both(self, model: RoughnessModel, recipe: RoughnessRecipe) -> dict[str, Answers]:
-        """Return the grades by a model of its training textures ('seen'), and of the others ('unseen')."""
-        parts = {'seen': self.grades.used_for(TRAIN), 'unseen': self.grades.used_for(TEST)}
-        return {part: self.ask(model, self.examples(recipe, textures)) for part, textures in parts.items()}
 
 
 def errors_chart(numbers: Mapping[str, Any], out: Path) -> Path:
@@ -238,7 +222,7 @@ def _grade_bars(axes: Any, table: ByTexture, place: Mapping[str, int], kind: str
 
 SCENE, GRADES = 'roughness', 'ets_roughness'
 SCANS = 200
-# Scans of each texture, and those at other speeds and forces and with a texture left out.
+# Scans of each texture, and those with a texture left out.
 COUNTS, QUICK_COUNTS = (SCANS, 50), (12, 4)
 QUICK_STEP = 8  # between the textures that the paper's regressors have left out
 OURS = 'roughness'
@@ -255,30 +239,30 @@ ONE_PERSON = 0.82  # grades from the mean of the others: 81 materials, 11 people
 
 
 def run(experiment: Experiment) -> ExperimentResult:
-    """Learn the paper's 15 textures and grade its 10 others; leave each of the 25 out."""
+    """Learn the paper's 15 textures and grade its 10 others; leave each of the 25 out.
+
+    With a search, the paper's regressors alone, with the variables found on the 15.
+    """
     simulated = SimulatedTextures(load_scene(SCENE), experiment.seed, quick=experiment.quick)
-    recipes = {name: load_roughness_recipe(recipe) for name, recipe in RECIPES.items()}
     train, test = simulated.grades.used_for(TRAIN), simulated.grades.used_for(TEST)
-    if experiment.tune:
-        return _after_search(simulated, {name: recipes[name] for name in PAPER}, experiment)
+    tuned = _searched(simulated, experiment) if experiment.tune else {}
+    recipes = {name: tuned[name].recipe if tuned else load_roughness_recipe(RECIPES[name]) for name in tuned or RECIPES}
     answers = {}
     for name, recipe in recipes.items():
         quick = _quickly(recipe, simulated)
-        model = train_grades(quick, simulated.examples(quick, train), simulated.grades, name)
-        answers[name] = simulated.ask_both(model, recipe)
-        if not experiment.seed:  # 25 models of each recipe: of the first seed alone
+        model = train_grades(
+            quick, simulated.extract(quick.feature_set, train, simulated.scans), simulated.grades, name
+        )
+        parts = {'seen': train, 'unseen': test}
+        answers[name] = {
+            part: simulated.ask(model, simulated.extract(recipe.feature_set, of, simulated.scans))
+            for part, of in parts.items()
+        }
+        if not experiment.seed and not tuned:  # 25 models of each recipe: of the first seed alone
             answers[name]['left_out'] = _leave_one_out(simulated, recipe)
-    numbers: dict[str, Any] = {
-        'seed': experiment.seed,
-        'digests': digests(),
-        'paper': {name: dict(zip(COLUMNS, row, strict=True)) for name, row in PAPER.items()},
-        'one_person': ONE_PERSON,
-        'always_the_middle': {part: float(np.abs(3.0 - one.true).mean()) for part, one in answers['ours'].items()},
-        'regressors': {name: {part: one.figures() for part, one in parts.items()} for name, parts in answers.items()},
-        'findings': [finding_as_json(finding) for finding in findings(answers)],
-    }
+    charts = () if experiment.seed or tuned else (_chart(simulated.textures, answers, experiment.out),)
     return ExperimentResult(
-        name='roughness',
+        name=f'roughness{"-tuned" if tuned else ""}',
         measured=(
             f'mean absolute error in grades of single windows of {USED_S} s, {SPEED_M_S} m/s, {FORCE_N} N; '
             'windows to which a regressor gives no grade are counted apart'
@@ -288,8 +272,17 @@ def run(experiment: Experiment) -> ExperimentResult:
             f"{simulated.scans} scans each; grades: the paper's Table I, by people on the real textures"
         ),
         split=f"by texture, the paper's: {len(train)} for training, {len(test)} for test",
-        numbers=numbers,
-        charts=_charts(simulated, answers, experiment),
+        numbers={
+            'seed': experiment.seed,
+            'digests': digests(tuned=experiment.tune),
+            'paper': {name: dict(zip(COLUMNS, row, strict=True)) for name, row in PAPER.items()},
+            'one_person': ONE_PERSON,
+            'always_the_middle': {part: float(np.abs(3.0 - one.true).mean()) for part, one in answers['ANN1'].items()},
+            'regressors': {name: {part: one.figures() for part, one in of.items()} for name, of in answers.items()},
+            'tuning': {name: one.as_json() for name, one in tuned.items()},
+            'findings': [finding_as_json(finding) for finding in findings(answers)],
+        },
+        charts=charts,
     )
 
 
@@ -311,7 +304,7 @@ def digests(*, tuned: bool = False) -> dict[str, str]:
 
 
 def _digest(simulated: SimulatedTextures, recipe: RoughnessRecipe) -> str:
-    examples = simulated.extract(recipe.feature_set, simulated.textures, 3, SPEED_M_S, FORCE_N)
+    examples = simulated.extract(recipe.feature_set, simulated.textures, 3)
     true = np.array([simulated.grades.of(label) for label in examples.labels])
     textures = np.unique(examples.labels, return_inverse=True)[1]
     definition = {key: value for key, value in recipe.as_mapping().items() if key in ('windows', 'inputs', 'regressor')}
@@ -342,7 +335,7 @@ def _better(claim: str, first: Mapping[str, Answers], second: Mapping[str, Answe
     both = [name for name in errors[0] if name in errors[1]]
     gains = {name: round(errors[1][name] - errors[0][name], 4) for name in both}
     gain = mean_over_seeds(list(gains.values())) if len(both) > 1 else mean(np.array([*gains.values()]))
-    here = ' against '.join(f'{one[part].figures()["error"]:.2f}' for one in (first, second))
+    here = ' against '.join(f'{one[part].figures()["error"] or math.nan:.2f}' for one in (first, second))
     return Finding(claim, f'{here} grades, {len(both)} textures', gain, by_texture=gains)
 
 
@@ -350,44 +343,21 @@ SEARCHED_SCANS = 40  # of each texture, of the 200, for a search
 OF_HEADS = SearchParams()  # the paper's
 
 
-def _after_search(
-    simulated: SimulatedTextures, recipes: Mapping[str, RoughnessRecipe], experiment: Experiment
-) -> ExperimentResult:
-    """Search the variables of the paper's regressors on its 15 textures, then grade the ten unseen ones.
+def _searched(simulated: SimulatedTextures, experiment: Experiment) -> dict[str, Tuned]:
+    """Search the variables of the paper's regressors on its 15 textures; the recipes are written next to the result.
 
-    The recipes that were found are written next to the result.
+    As in the paper, each half holds windows of every texture: the search does not see how a new texture fares.
     """
-    train, test = simulated.grades.used_for(TRAIN), simulated.grades.used_for(TEST)
-    most = experiment.search or (QUICK if simulated.quick else None)
-    params = replace(OF_HEADS.within(most), seed=simulated.seed)
-    scans = simulated.slides(train, min(SEARCHED_SCANS, simulated.scans), SPEED_M_S, FORCE_N)
-    # As in the paper, each half holds windows of every texture: the search does not see how a new texture fares.
-    tuned, answers = {}, {}
-    for name, recipe in recipes.items():
-        base = checkless(recipe)
+    params = replace(QUICK if experiment.quick else OF_HEADS, seed=experiment.seed)
+    train = simulated.grades.used_for(TRAIN)
+    scans = simulated.slides(train, min(SEARCHED_SCANS, simulated.scans))
+    tuned = {}
+    for name in PAPER:
+        base = checkless(load_roughness_recipe(RECIPES[name]))
         found = search(base, scans, params, grading(simulated.grades))
         tuned[name] = Tuned(varied(base, found.individual), params, {'': found}, len(scans.labels))
-    for name, one in tuned.items():
-        one.write(experiment.out / f'{RECIPES[name]}-tuned.yaml')
-        model = train_grades(
-            _quickly(one.recipe, simulated), simulated.examples(one.recipe, train), simulated.grades, name
-        )
-        answers[name] = simulated.ask_both(model, one.recipe)
-    return ExperimentResult(
-        name='roughness-tuned',
-        measured=f'mean absolute error in grades after a search of {params}, {len(scans.labels)} scans',
-        data=f'simulated: {len(simulated.textures)} surfaces, {simulated.scans} scans each',
-        split=f"by texture, the paper's: {len(train)} for training and search, {len(test)} for test",
-        numbers={
-            'seed': simulated.seed,
-            'digests': digests(tuned=True),
-            'regressors': {
-                name: {part: one.figures() for part, one in parts.items()} for name, parts in answers.items()
-            },
-            'tuning': {name: one.as_json() for name, one in tuned.items()},
-            'findings': [finding_as_json(finding) for finding in findings(answers)],
-        },
-    )
+        tuned[name].write(experiment.out / f'{RECIPES[name]}-tuned-{experiment.seed}.yaml')
+    return tuned
 
 
 def checkless(recipe: RoughnessRecipe) -> RoughnessRecipe:
@@ -402,7 +372,8 @@ def checkless(recipe: RoughnessRecipe) -> RoughnessRecipe:
 
 def _leave_one_out(simulated: SimulatedTextures, recipe: RoughnessRecipe) -> Answers:
     """Return the grades of each texture by a model of all others; a quick run skips some of the paper's."""
-    examples = _thinned(simulated.examples(recipe, simulated.textures), simulated.other_scans)
+    examples = simulated.extract(recipe.feature_set, simulated.textures, simulated.scans)
+    examples = _thinned(examples, simulated.scans_left_out)
     parts = []
     for texture in simulated.textures[:: QUICK_STEP if simulated.quick and recipe.name != OURS else 1]:
         held = examples.labels == texture
@@ -428,11 +399,7 @@ def _thinned(examples: LabelledFeatures, count: int) -> LabelledFeatures:
     return _rows(examples, kept)
 
 
-def _charts(
-    simulated: SimulatedTextures,
-    answers: Mapping[str, Mapping[str, Answers]],
-    experiment: Experiment,
-) -> tuple[Any, ...]:
+def _chart(textures: Sequence[str], answers: Mapping[str, Mapping[str, Answers]], out: Path) -> Path:
     panels = {
         f'{name}: training and unseen textures': {
             'training': answers[name]['seen'].by_texture(),
@@ -440,10 +407,6 @@ def _charts(
         }
         for name in ('ANN5', 'ours')
     }
-    if 'left_out' in answers['ours']:
-        panels['ours: each texture left out in turn'] = {'unseen': answers['ours']['left_out'].by_texture()}
-    where = f'simulated, {len(simulated.textures)} textures'
-    return (
-        grades_chart(panels, simulated.textures, f'Roughness as people grade it, and as it is estimated ({where})',
-                     experiment.out / 'roughness_grades.png'),
-    )  # fmt: skip
+    panels['ours: each texture left out in turn'] = {'unseen': answers['ours']['left_out'].by_texture()}
+    title = f'Roughness as people grade it, and as it is estimated (simulated, {len(textures)} textures)'
+    return grades_chart(panels, textures, title, out / 'roughness_grades.png')

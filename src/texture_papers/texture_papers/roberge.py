@@ -35,7 +35,7 @@ search
     Paper: 20 individuals, 30 generations, the mean of learning and test over 20 halves (IV); from there 10 and 10
         for the vote, 13 and 10 for ten textures. Test slides are part of the fitness.
     Here: `texture experiment NAME --tune`: the same for each pair, on the training half alone; 10 halves for the vote.
-        Test slides are never part.
+        Networks 10 and 5 with 4 halves, for the vote the best 10 of these with 2. Test slides are never part.
 variables
     Paper: A set for each pair (III.C), not printed.
     Here: `…-pairs`: those found for the first seed of the experiment, in the size that the file names. The other
@@ -45,8 +45,7 @@ standardisation
     Here: Features have zero mean and unit variance.
 friction
     Paper: The next question (VI).
-    Here: `texture experiment friction`, simulated. Live, the recipe `friction-svm` needs the arm `ur` or
-        `ros_controllers`.
+    Here: The recipe `friction-svm`, which needs the arm `ur` or `ros_controllers`; without figures.
 """
 
 from __future__ import annotations

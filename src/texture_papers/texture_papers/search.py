@@ -5,10 +5,8 @@
 from __future__ import annotations
 
 import copy
-import math
-import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +14,6 @@ import numpy as np
 import yaml
 
 from texture_core.config import library, writing
-from texture_core.errors import InvalidParameter
 from texture_core.types import AnyArray, Array
 from texture_estimation.learners.learner import Codes, log_softmax, standardisation
 from texture_estimation.recipe import Recipe
@@ -35,21 +32,8 @@ class SearchParams:
     halves: int = 20
     seed: int = 0
 
-    def __post_init__(self) -> None:
-        low = {'population': 4, 'generations': 1, 'halves': 2}
-        for name, least in low.items():
-            if (value := getattr(self, name)) < least:
-                raise InvalidParameter(f'{name} of a search is {value}; it is at least {least}')
-
     def __str__(self) -> str:
         return f'{self.population} individuals, {self.generations} generations, {self.halves} halves'
-
-    def within(self, most: SearchParams | None) -> SearchParams:
-        """Return the size, no part of it larger than that of another."""
-        if most is None:
-            return self
-        names = ('population', 'generations', 'halves')
-        return replace(self, **{name: min(getattr(self, name), getattr(most, name)) for name in names})
 
 
 QUICK = SearchParams(population=4, generations=2, halves=2)
@@ -228,11 +212,10 @@ def search(
     score: Score = recognition,
     *,
     start: Sequence[Individual] = (),
-    until_s: float = math.inf,
 ) -> Found:
     """Return the best individual by the mean of learning and test score over the halves.
 
-    Individuals of another search may be the first. TimeoutError is raised after a time of the clock `time.time`.
+    Individuals of another search may be the first.
 
     Source: Roberge et al., "Textures recognition through tactile exploration", section IV.
     """
@@ -257,8 +240,6 @@ def search(
             break
         points = [tuple(int(number) for number in point) for point in offspring.get('X')]
         for point in points:
-            if time.time() > until_s:
-                raise TimeoutError
             if point not in known:
                 known[point] = scores(point)
         offspring.set('F', np.array([[-known[point].mean()] for point in points]))

@@ -20,7 +20,7 @@ from texture_core.types import Array, Samples
 from texture_estimation.learners.learner import Codes
 from texture_features.feature_set import FeatureSet
 from texture_features.windows import SEPARATOR, WindowBatch, WindowParams, axis_along
-from texture_simulation.offline import simulate_slide_streams
+from texture_simulation.offline import APPROACH_S, CONTACT_S, LIFT_S, simulate_exploration, simulate_slide_streams
 from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import Scene
 from texture_simulation.sensor_models import SENSORS
@@ -49,6 +49,10 @@ class Visits:
     views: tuple[View, ...] = (View(),)
     radius_m: float = 0.0
     random: float = 0.0
+
+
+class EntireContacts(Visits):
+    """Trials of which press and lift are part: together they last as long as the slide of others."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,11 +210,25 @@ def _measured(
     rng = np.random.default_rng([*seeds, number])
     sliding = replace(_sliding(visits, np.random.default_rng(seeds)), duration_s=duration_s)
     sliding = replace(sliding, direction_rad=sliding.direction_rad + view.turned_rad)
+    if isinstance(visits, EntireContacts):
+        contacts = [_contact(scene, surface, sliding, kind.fast.rate_hz, rng) for _ in range(visits.count)]
+        return {kind.fast.topic: np.stack(contacts)}
     touched = scene
     if visits.radius_m:  # one object with another curvature
         curved = replace(scene.surface(surface), shape=Curved(visits.radius_m))
         touched = replace(scene, surfaces={**scene.surfaces, surface: curved})
     return simulate_slide_streams(touched, surface, visits.count, sliding, rng, finger=view.finger, slow=slow)
+
+
+def _contact(scene: Scene, surface: str, sliding: SimulatedSlide, rate_hz: float, rng: np.random.Generator) -> Samples:
+    """Return what the fast stream measures from the first touch to the end of the lift."""
+    slide_s = sliding.duration_s - CONTACT_S - LIFT_S
+    speed_m_s, force_n = float(sliding.speed_m_s), float(sliding.force_n)
+    _, recording = simulate_exploration(
+        scene, surface, speed_m_s, force_n, slide_s, start_ns=0, exploration_id='', rng=rng
+    )
+    samples = np.concatenate([batch.samples for batch in recording['signal']])
+    return samples[round(APPROACH_S * rate_hz) :][: round(sliding.duration_s * rate_hz)]
 
 
 def _sliding(visits: Visits, rng: np.random.Generator) -> SimulatedSlide:

@@ -5,54 +5,32 @@
 from __future__ import annotations
 
 import argparse
-import math
-import time
 from pathlib import Path
 
 from texture_core.cli import add_seed, core_count
-from texture_papers.catalogue import EXPERIMENTS, run_experiment, run_over_seeds, run_searches
+from texture_papers.catalogue import EXPERIMENTS, run_experiment
 from texture_papers.protocol import Experiment
-from texture_papers.search import SearchParams
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the sub-command."""
     parser.add_argument('name', help=f'one of {", ".join(EXPERIMENTS)}')
     parser.add_argument('--out', type=Path, default=Path('docs/charts'), metavar='DIR', help='folder for the results')
-    parser.add_argument('--quick', '--reduced', action='store_true', help='fewer slides; not for publishing')
+    parser.add_argument('--quick', action='store_true', help='fewer slides; not for publishing')
     parser.add_argument(
         '--tune', action='store_true', help='search the variables of each pair of textures, or of a regressor, first'
     )
     parser.add_argument(
         '--seeds', type=int, default=1, metavar='N', help='number of seeds from --seed on: mean and interval over them'
     )
-    parser.add_argument(
-        '--search',
-        type=int,
-        nargs=3,
-        metavar=('INDIVIDUALS', 'GENERATIONS', 'HALVES'),
-        help='largest size of a search with --tune; without it, that of the paper',
-    )
     parser.add_argument('--jobs', type=core_count, default=1, metavar='N', help='cores for the searches of --tune')
-    parser.add_argument(
-        '--minutes', type=float, default=math.inf, metavar='M', help='end the searches then; the same command continues'
-    )
     add_seed(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run one experiment, print its table and name the files."""
-    search = None
-    if options.search:
-        population, generations, halves = options.search
-        search = SearchParams(population, generations, halves)
-    experiment = Experiment(options.out, options.seed, options.quick, options.tune, search=search)
-    until_s = time.time() + 60.0 * options.minutes
-    experiment = run_searches(options.name, experiment, options.seeds, options.jobs, until_s)
-    if options.seeds == 1:
-        result, path = run_experiment(options.name, experiment)
-    else:
-        result, path = run_over_seeds(options.name, experiment, options.seeds)
+    experiment = Experiment(options.out, options.seed, options.quick, options.tune, options.jobs)
+    result, path = run_experiment(options.name, experiment, options.seeds)
     if options.quick:
         print('REDUCED: fewer slides, not comparable with a published figure')
     print(f'{result.name}: {result.measured}')
