@@ -290,23 +290,13 @@ class ClassDistance:
             found[code] = (points.T, 0.5 * np.einsum('ij,ij->i', points, points))
         return found
 
-    @cached_property
-    def _directions(self) -> Array:
-        """Projection by columns: so a product with one slide is faster."""
-        return np.asfortranarray(self.projection)
-
-    @cached_property
-    def _nearer(self) -> Array:
-        """What the square along each direction counts less about the centre than about a slide, (n_directions,)."""
-        return 1.0 - self.weights
-
     def score(self, mean: Array, code: int) -> Array:
         """Return the score, (...), of mean features (..., n_features) for a class; infinite without its slides."""
         found = self._of_class.get(code)
         if found is None:
             return np.full(mean.shape[:-1], np.inf)
         points, half_squares = found
-        projected = mean @ self._directions
+        projected = mean @ self.projection
         projected -= self.centre
         # Half the squared distances, less half the square of what is away from the centre.
         halves = half_squares - projected @ points
@@ -314,7 +304,7 @@ class ClassDistance:
             halves.partition(NEAREST - 1)
             halves = halves[..., :NEAREST]
         nearest: Array = np.add.reduce(halves, axis=-1) * (2.0 / halves.shape[-1])
-        nearest += (projected * projected) @ self._nearer
+        nearest += (projected * projected) @ (1.0 - self.weights)
         return nearest
 
     def with_slides(self, means: Array, classes: Codes) -> ClassDistance:

@@ -453,14 +453,14 @@ class TextureModel(StoredModel):
     @cached_property
     def active_acceptance(self) -> Acceptance:
         """The acceptance with the added slides."""
-        added = self.added_slides
+        added, distance = self.added_slides, self.acceptance.distance
         if not added:
             return self.acceptance
-        means = [compared_start(self.compared(slide.values), self._overlap) for slide in added]
-        codes = np.array([self.labels.index(slide.label) for slide in added])
-        return self.acceptance.with_slides(
-            np.stack(means), codes, [slide.conditions for slide in added], [slide.label for slide in added]
-        )
+        if distance is not None:
+            means = [compared_start(self.compared(slide.values), self._overlap) for slide in added]
+            distance = distance.with_slides(np.stack(means), np.array([self.labels.index(x.label) for x in added]))
+        domain = self.acceptance.domain.widened([one.conditions for one in added], [one.label for one in added])
+        return replace(self.acceptance, distance=distance, domain=domain)
 
     def acceptance_of(self, number: int) -> Acceptance:
         """Return the acceptance for the label of this number: few slides of an added one show little."""
@@ -527,10 +527,13 @@ class TextureModel(StoredModel):
         X : (n_features,), or (n, n_features)
             Of the windows of one slide.
         """
-        log_probabilities = self.predict_log_proba(X)
+        return self.best_labels(self.predict_log_proba(X))
+
+    def best_labels(self, log_probabilities: Array) -> list[str]:
+        """Return the most probable label of each row, (n, n_labels); '' where several labels are equally good."""
         best = log_probabilities.argmax(axis=-1).tolist()
-        none = is_tied(log_probabilities).tolist()
-        return ['' if tied else self.labels[index] for index, tied in zip(best, none, strict=True)]
+        tied = is_tied(log_probabilities).tolist()
+        return ['' if none else self.labels[index] for index, none in zip(best, tied, strict=True)]
 
     def with_added_slides(self, added_slides: tuple[AddedSlide, ...]) -> TextureModel:
         """Return the model with these added slides in place of those it has.
