@@ -188,7 +188,7 @@ def test_held_out_slides_are_followed_as_the_classifier_follows_them(estimates_o
     model = train(Recipe.from_mapping({**CONTENT, 'learner': 'force_discriminant'}, 'forces'), examples)
     forces = [1.0, 4.5, 40.0, 1.0]
     values = np.array([[3.0 if force < 2.0 else -3.0, force] for force in forces])
-    trusted = np.array([model.trust(row) for row in values])
+    trusted = model.predictor.trust(values)
     means, effective = followed(model.recipe.evidence, model.predict_log_proba(values), 0.5, trusted)
     expected = np.exp(model.recipe.evidence.log_posterior(means, effective[:, None], model.tempering_exponent))
     found = probabilities_after(estimates_of, model, forces)

@@ -16,7 +16,6 @@ from texture_core.config import folder
 from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.types import SlideMotion
 from texture_estimation.model import AddedSlide, load_model, read_added_slides, write_added_slide, write_tree
-from texture_estimation.next_motion import NextTouchModel
 from texture_estimation.recipe import load_recipe
 from texture_estimation.roughness import Grades, load_roughness_recipe, train_grades
 from texture_estimation.training import train
@@ -174,15 +173,6 @@ def test_a_model_of_slides_of_several_kinds_knows_them_after_it_was_saved(exampl
     belief = known.update(known.uniform_log_prior, motions[1], slide)
     np.testing.assert_array_equal(loaded.next_touch_model.update(known.uniform_log_prior, motions[1], slide), belief)
     assert known.textures[belief.argmax()] == 'felt'
-
-
-@pytest.mark.parametrize('part', ['means', 'projection'])
-def test_a_model_whose_motions_are_no_numbers_is_refused(part, model, tmp_path):
-    motions = (SlideMotion('linear_slide', 0.0, 0.1, 2.0, 1.0),)
-    whole = NextTouchModel(('a', 'b'), np.zeros((len(model.names), 3)), motions, np.zeros((1, 2, 3)))
-    broken = dataclasses.replace(whole, **{part: getattr(whole, part) * np.nan})
-    assert load_model(dataclasses.replace(model, next_touch_model=whole).save(tmp_path / 'whole')).next_touch_model
-    refused(dataclasses.replace(model, next_touch_model=broken).save(tmp_path / 'broken'), 'not finite')
 
 
 def test_what_was_fitted_for_acceptance_is_the_same_after_it_was_saved(model, tmp_path):

@@ -12,6 +12,7 @@ from texture_core.types import NANOSECONDS, Array, FeatureVector, Rejection, Tex
 from texture_estimation.acceptance import SlideDistance, margin_of
 from texture_estimation.evidence_rules import GroupedEvidence, followed
 from texture_estimation.gaussians import GaussianClasses, SlideMoments
+from texture_estimation.learners.learner import trust
 from texture_estimation.model import LEAST_PROBABILITY, TextureModel
 from texture_features.feature_set import RunningConditions, fingerprint_difference
 from texture_features.windows import WindowParams
@@ -118,7 +119,7 @@ class EvidenceAccumulator:
         self._evidence_ns += max(0, end - max(vector.start_ns, self._end_ns))
         effective_windows = self._evidence_ns / self._window_ns
         evidence = model.recipe.evidence.window_evidence(scores)
-        self._evidence.add(evidence, effective_windows, model.trust(vector.values))
+        self._evidence.add(evidence, effective_windows, float(trust(model.predictor, vector.values)))
         self._end_ns = max(end, self._end_ns)
         if self._moments is not None:
             self._moments.add(vector.values)
