@@ -400,21 +400,19 @@ class Acceptance:
         """Return the least score at which slides end early and rarely with a wrong label, disturbed or not."""
         if self.decided_reason:
             return NEVER
-        scores, wrong, disturbed = [], [], []
+        scores = []
         for slide in slides:
             limits = [self.limits(length) for length in slide.effective_windows.tolist()]
             rows = zip(limits, slide.scored.tolist(), strict=True)
             scores.append(np.array([one.score(*row) if one.accepts(*row) else -math.inf for one, row in rows]))
-            wrong.append(~slide.right)
-            disturbed.append(bool(slide.disturbance))
-        of = np.array(disturbed)
+        of = np.array([bool(slide.disturbance) for slide in slides])
         allowed = {kind: int(self.rates.max_error_rate * (of == kind).sum()) for kind in (False, True)}
         tried = np.unique(
             np.quantile([s.max() for s in scores if np.isfinite(s.max())] or [NEVER], np.linspace(0, 1, 50))
         )
         for least in tried.tolist():
             ends = [(score >= least).argmax() if score.max() >= least else -1 for score in scores]
-            errors = np.array([end >= 0 and bool(bad[end]) for end, bad in zip(ends, wrong, strict=True)])
+            errors = np.array([end >= 0 and not slide.right[end] for end, slide in zip(ends, slides, strict=True)])
             if all(errors[of == kind].sum() <= most for kind, most in allowed.items()):
                 return float(least)
         return NEVER
