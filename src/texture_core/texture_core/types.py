@@ -744,10 +744,24 @@ def quaternion_matrix(quaternion: Sequence[float]) -> Array:
 
 def rotation_vector(matrix: Array) -> Array:
     """Return the rotation vector of a rotation, the inverse of `rotation_matrix`."""
-    from scipy.spatial.transform import Rotation  # noqa: PLC0415  # takes 0.3 s, and only fitting a surface needs it
-
-    vector: Array = Rotation.from_matrix(matrix).as_rotvec()
-    return vector
+    # The quaternion from its largest component is exact also at half a turn (Shepperd 1978).
+    trace = float(np.trace(matrix))
+    squares = np.array([*(1.0 + 2.0 * np.diag(matrix) - trace), 1.0 + trace])  # 4·x², 4·y², 4·z², 4·w²
+    largest = int(np.argmax(squares))
+    products = matrix + matrix.T  # 4·x·y and so on off the diagonal
+    differences = np.array([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]])
+    if largest == 3:
+        quaternion = np.array([*differences, squares[3]])
+    else:
+        quaternion = np.array([*products[largest], differences[largest]])
+        quaternion[largest] = squares[largest]
+    quaternion = quaternion / np.linalg.norm(quaternion)
+    if quaternion[3] < 0.0:
+        quaternion = -quaternion
+    length = float(np.linalg.norm(quaternion[:3]))
+    if length == 0.0:
+        return np.zeros(3)
+    return quaternion[:3] * (2.0 * np.arctan2(length, quaternion[3]) / length)
 
 
 # --------------------
