@@ -338,7 +338,6 @@ def _real(path: str | Path) -> Path:
 # Read YAML and JSON of any origin as plain values: nothing is run. Figures are also written as JSON here.
 
 MAX_CHARACTERS = 100_000  # of YAML, which take 3 s at worst; the longest settings in use have a tenth
-MAX_VALUES = 200_000  # of YAML with every alias expanded, as a loop over all would hardly end
 MAX_CARD_BYTES = 5 * MB
 # What the parsers raise, depending on what is wrong; a value such as 2024-99-99 or !!bool x is no YAMLError.
 PARSE_ERRORS = (
@@ -372,10 +371,6 @@ def parse_yaml(text: str) -> Any:
     """Return the plain values in a text; one of `PARSE_ERRORS` is raised if it is no YAML, or too much of it."""
     if len(text) > MAX_CHARACTERS:
         raise ValueError(f'it has {len(text)} characters; {MAX_CHARACTERS} are allowed')
-    # The tree of nodes has each alias once: values are counted before any is made.
-    node = yaml.compose(text, yaml.SafeLoader)
-    if node is not None and _count_values(node, {}) > MAX_VALUES:
-        raise ValueError(f'its aliases expand to more than {MAX_VALUES} values; reduce them')
     return yaml.safe_load(text)
 
 
@@ -400,16 +395,6 @@ def safe_repr(value: Any) -> str:
         return 'something nested too deeply'
     except ValueError:
         return 'a number of thousands of digits'
-
-
-def _count_values(node: yaml.Node, known: dict[int, float]) -> float:
-    """Return the number of values of a node with all aliases expanded; infinite if it contains itself."""
-    if id(node) not in known:
-        known[id(node)] = math.inf
-        parts = node.value if isinstance(node, yaml.CollectionNode) else ()
-        children = [child for part in parts for child in (part if isinstance(part, tuple) else (part,))]
-        known[id(node)] = 1 + sum(_count_values(child, known) for child in children)
-    return known[id(node)]
 
 
 # --------------------

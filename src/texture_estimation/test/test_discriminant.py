@@ -89,14 +89,14 @@ def test_confidence_falls_where_days_differ(make_examples):
 def test_a_model_of_one_place_reports_it_where_it_rejects(make_examples):
     examples = make_examples(slides=8)
     model = train(RECIPE, examples)
-    assert model.acceptance.domain.reach['cork'] == {'sessions': 1, 'places': 1, 'fingers': 1}
+    assert model.acceptance.domain.places == 1
     strange = replace(examples, values=examples.values + 50.0)
     evidence = EvidenceAccumulator(model)
     final = [evidence.update(vector) for vector in strange.vectors('cork/0')][-1]
     assert not final.accepted
     assert ONE_PLACE in final.message
     of_two = train(RECIPE, of_days(examples))
-    assert of_two.acceptance.domain.reach['cork'] == {'sessions': 2, 'places': 1, 'fingers': 1}
+    assert of_two.acceptance.domain.places == 2
     assert of_two.acceptance.domain.reach_reason == ''
 
 
@@ -188,7 +188,7 @@ def test_held_out_slides_are_followed_as_the_classifier_follows_them(estimates_o
     model = train(Recipe.from_mapping({**CONTENT, 'learner': 'force_discriminant'}, 'forces'), examples)
     forces = [1.0, 4.5, 40.0, 1.0]
     values = np.array([[3.0 if force < 2.0 else -3.0, force] for force in forces])
-    trusted = np.array([model.trust(row) for row in values])
+    trusted = model.predictor.trust(values)
     means, effective = followed(model.recipe.evidence, model.predict_log_proba(values), 0.5, trusted)
     expected = np.exp(model.recipe.evidence.log_posterior(means, effective[:, None], model.tempering_exponent))
     found = probabilities_after(estimates_of, model, forces)
@@ -234,6 +234,6 @@ def test_one_track_is_cut_into_parts_that_are_held_out_as_places(make_examples):
 def test_a_training_over_one_track_stays_one_in_the_card(make_examples):
     examples = make_examples(slides=8, windows=12)
     parts = train(replace(RECIPE, training=replace(RECIPE.training, held_out_places=3)), examples)
-    assert parts.acceptance.domain.reach['cork'] == {'sessions': 1, 'places': 1, 'fingers': 1}
+    assert parts.acceptance.domain.places == 1
     assert parts.acceptance.domain.slides['cork'] == 8
     assert parts.training['slides'] == parts.acceptance.slides == 32

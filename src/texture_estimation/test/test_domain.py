@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from texture_estimation.domain import FULL_CIRCLE, Domain, DomainMargins, covered_arcs
+from texture_estimation.domain import Domain
 from texture_features.feature_set import SlideConditions
 
 
@@ -13,7 +13,7 @@ def conditions(speed_m_s=0.05, force_n=1.0, motion='linear_slide', sensor='tsf85
 
 
 def trained_on(*slides, **margins):
-    return Domain.of_slides(slides, ['cork'] * len(slides), DomainMargins(**margins))
+    return Domain.of_slides(slides, ['cork'] * len(slides), **margins)
 
 
 TRAINED = trained_on(conditions(0.045, 0.9), conditions(0.055, 1.1))
@@ -42,7 +42,7 @@ def test_each_condition_that_was_not_trained_is_named_with_what_was(came, senten
     ('speed', 'within'), [(0.05 / 1.14, True), (0.05 / 1.16, False), (0.057, True), (0.058, False)]
 )
 def test_a_range_is_wider_than_its_slides_by_the_margin(speed, within):
-    assert (trained_on(conditions(0.05), speed=0.15).deviation(conditions(speed)) == '') is within
+    assert (trained_on(conditions(0.05), speed_margin=0.15).deviation(conditions(speed)) == '') is within
 
 
 def test_a_slide_widens_the_range_by_how_its_mean_settles_and_one_odd_slide_of_many_does_not():
@@ -60,17 +60,19 @@ def test_what_is_unknown_in_the_slide_or_in_the_training_is_not_compared():
 
 
 @pytest.mark.parametrize(
-    ('directions', 'arcs'),
+    ('direction', 'sentence'),
     [
-        ((), ()),
-        ((0.5,), ((0.5, 0.5),)),
-        ((0.0, 0.2, 2.0), ((0.0, 0.2), (2.0, 2.0))),
-        ((3.1, -3.1), ((3.1, math.tau - 3.1),)),
-        (tuple(0.5 * k for k in range(13)), (FULL_CIRCLE,)),
+        (0.3, ''),
+        (-0.3, ''),
+        (0.75, ''),
+        (1.2, 'direction 1.2 rad, trained 0.6 rad'),
+        (3.1 - math.tau, ''),
+        (2.7, 'direction 2.7 rad, trained 3.1 rad'),
     ],
 )
-def test_arcs_bridge_small_gaps_also_across_the_back(directions, arcs):
-    assert sorted(covered_arcs(directions, 0.6)) == [pytest.approx(arc) for arc in arcs]
+def test_a_direction_is_trained_if_it_is_near_one_that_was_also_across_the_back(direction, sentence):
+    trained = trained_on(conditions(directions_rad=(0.0, 0.6)), conditions(directions_rad=(3.1,)))
+    assert trained.deviation(conditions(directions_rad=(direction,))).removeprefix('outside the training: ') == sentence
 
 
 def test_to_and_fro_is_trained_if_both_directions_are():
@@ -85,7 +87,7 @@ def at_level(rms, channel='signal/pac', **known):
 
 @pytest.mark.parametrize(('rms', 'within'), [(2.1, True), (1.9, False), (15.9, True), (16.1, False)])
 def test_a_signal_far_stronger_or_weaker_than_any_trained_is_outside(rms, within):
-    domain = trained_on(at_level(4.0), at_level(8.0), level=1.0)
+    domain = trained_on(at_level(4.0), at_level(8.0))
     sentence = f'outside the training: signal level {rms:.3g} of signal/pac, trained 4 to 8'
     assert domain.deviation(at_level(rms)) == ('' if within else sentence)
     assert domain.deviation(at_level(rms, 'signal/other')) == ''

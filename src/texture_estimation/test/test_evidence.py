@@ -146,10 +146,11 @@ def test_the_part_that_differs_is_named(came, trained, words):
 
 def voted(votes, group=5):
     """Return what is decided after each window, given for which of two labels it votes; None for undecided."""
-    rule, evidence, decided = MajorityVote(windows=group), GroupedEvidence(2, group), []
-    for vote in votes:
-        evidence.add(np.eye(2)[vote], 0.1)
-        posterior = rule.posterior(evidence.mean, evidence.time_s / 0.1, 1.0)
+    rule, decided = MajorityVote(windows=group), []
+    evidence = GroupedEvidence(rule, 2)
+    for number, vote in enumerate(votes, start=1):
+        evidence.add(np.eye(2)[vote], float(number))
+        posterior = rule.posterior(evidence.mean, evidence.windows, 1.0)
         decided.append(int(posterior.argmax()) if np.ptp(posterior) > 1e-9 else None)
     return decided
 

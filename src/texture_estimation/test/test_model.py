@@ -16,7 +16,6 @@ from texture_core.config import folder
 from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.types import SlideMotion
 from texture_estimation.model import AddedSlide, load_model, read_added_slides, write_added_slide, write_tree
-from texture_estimation.next_motion import NextTouchModel
 from texture_estimation.recipe import load_recipe
 from texture_estimation.roughness import Grades, load_roughness_recipe, train_grades
 from texture_estimation.training import train
@@ -176,15 +175,6 @@ def test_a_model_of_slides_of_several_kinds_knows_them_after_it_was_saved(exampl
     assert known.textures[belief.argmax()] == 'felt'
 
 
-@pytest.mark.parametrize('part', ['means', 'projection'])
-def test_a_model_whose_motions_are_no_numbers_is_refused(part, model, tmp_path):
-    motions = (SlideMotion('linear_slide', 0.0, 0.1, 2.0, 1.0),)
-    whole = NextTouchModel(('a', 'b'), np.zeros((len(model.names), 3)), motions, np.zeros((1, 2, 3)))
-    broken = dataclasses.replace(whole, **{part: getattr(whole, part) * np.nan})
-    assert load_model(dataclasses.replace(model, next_touch_model=whole).save(tmp_path / 'whole')).next_touch_model
-    refused(dataclasses.replace(model, next_touch_model=broken).save(tmp_path / 'broken'), 'not finite')
-
-
 def test_what_was_fitted_for_acceptance_is_the_same_after_it_was_saved(model, tmp_path):
     loaded = load_model(model.save(tmp_path / 'model')).acceptance
     assert loaded.limits(2.5) == model.acceptance.limits(2.5)
@@ -200,7 +190,6 @@ def test_what_was_fitted_for_acceptance_is_the_same_after_it_was_saved(model, tm
         ('rates', {'coverage': 0.9}, 'the entries coverage; max_accepted_wrong'),
         ('slides', True, 'slides is True'),
         ('slides', 12.5, 'slides is 12.5'),
-        ('slides', -1, 'acceptance has -1 slides'),
         ('added', 3, 'added is 3'),
         ('domain', 'any', "domain is 'any'; the entries motions"),
     ],
@@ -211,18 +200,6 @@ def test_an_acceptance_of_no_such_numbers_is_refused_in_one_sentence(saved, entr
     card['acceptance'][entry] = value
     path.write_text(json.dumps(card))
     refused(saved, f"{sentence}.*; train it again with 'texture train'")
-
-
-@pytest.mark.parametrize(
-    ('name', 'value'),
-    [('speed_m_s', [0.2, 0.1]), ('force_n', [0.0, float('inf')]), ('directions_rad', [[0.0, 9.0]]), ('force_n', [1.0])],
-)
-def test_a_domain_with_an_impossible_range_is_refused(saved, name, value):
-    path = saved.with_suffix('.json')
-    card = json.loads(path.read_text())
-    card['acceptance']['domain'][name] = value
-    path.write_text(json.dumps(card))
-    refused(saved, 'train it again')
 
 
 def test_the_conditions_of_an_added_slide_survive_its_file(tmp_path):

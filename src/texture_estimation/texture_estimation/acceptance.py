@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -24,13 +24,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.errors import InvalidData
 from texture_core.types import Array, Rejection
 from texture_estimation.domain import Domain
 from texture_estimation.evidence_rules import EvidenceRule
 from texture_estimation.gaussians import DISTANCE_WINDOWS, ClassDistance
-from texture_estimation.learners.learner import Codes, is_tied
-from texture_features.feature_set import SlideConditions
+from texture_estimation.learners.learner import is_tied
 
 # --------------------
 # What a number of held-out slides can show.
@@ -38,7 +36,6 @@ from texture_features.feature_set import SlideConditions
 SIGNIFICANCE = 0.05  # fraction of all trainings in which the error rate exceeds its upper bound
 LEAST_SLIDES_A_LABEL = 5  # with one held out, four show how much slides differ
 TRIALS = 2  # of each held-out slide: with its label in the model, and with that removed
-MAX_SLIDES = 1_000_000
 
 
 def slides_needed(rate: float) -> float:
@@ -166,28 +163,22 @@ class Limits(NamedTuple):
 
 NEVER = 1e9  # as a limit of scores
 RIDGE = 1e-3  # on the factors of standardised inputs, relative to the number of slides: separable ones stay finite
-STEPS = 50
 
 
 def _regression(positive: Array, negative: Array) -> tuple[float, float, float]:
     """Return offset and factors of the log-odds between two equally likely sets of margins and distances, (n, 2)."""
+    from sklearn.linear_model import LogisticRegression  # noqa: PLC0415  # takes seconds, and only training needs it
+
     both = np.concatenate([positive, negative])
     centre, scale = both.mean(axis=0), both.std(axis=0) + 1e-9
     inputs = np.column_stack([np.ones(len(both)), (both - centre) / scale])
-    truth = np.repeat([1.0, 0.0], [len(positive), len(negative)])
+    truth = np.repeat([1, 0], [len(positive), len(negative)])
     weights = np.repeat([0.5 / len(positive), 0.5 / len(negative)], [len(positive), len(negative)])
-    found = np.zeros(3)
-    for _ in range(STEPS):  # Newton's method
-        chance = 1.0 / (1.0 + np.exp(-np.clip(inputs @ found, -30.0, 30.0)))
-        slope = inputs.T @ (weights * (truth - chance)) - RIDGE * found
-        curvature = (inputs.T * (weights * chance * (1.0 - chance))) @ inputs + RIDGE * np.eye(3)
-        step = np.linalg.solve(curvature, slope)
-        found += step
-        if np.abs(step).max() < 1e-6:
-            break
+    learner = LogisticRegression(C=1.0 / RIDGE, fit_intercept=False, solver='newton-cholesky', tol=1e-8)
+    offset, margin, distance = learner.fit(inputs, truth, weights).coef_[0].tolist()
     # More margin or less distance never speaks against a label.
-    margin, distance = max(found[1], 0.0) / scale[0], min(found[2], 0.0) / scale[1]
-    return float(found[0] - margin * centre[0] - distance * centre[1]), float(margin), float(distance)
+    margin, distance = max(margin, 0.0) / scale[0], min(distance, 0.0) / scale[1]
+    return float(offset - margin * centre[0] - distance * centre[1]), float(margin), float(distance)
 
 
 def _rank(slides: int, rate: float) -> int:
@@ -308,15 +299,6 @@ class Acceptance:
     distance: ClassDistance | None = None
     added: str = ''
 
-    def __post_init__(self) -> None:
-        if not 0 <= self.slides <= MAX_SLIDES:
-            raise InvalidData(f'acceptance has {self.slides} slides; 0 to {MAX_SLIDES} are possible')
-        shape = (len(LEVELS) if self.distance else 0, len(Limits._fields))
-        if self.levels.shape != shape or np.isnan(self.levels).any():
-            raise InvalidData(
-                f'acceptance has limits of shape {self.levels.shape}; numbers of shape {shape} are needed'
-            )
-
     def fitted(
         self, near: Sequence[HeldOutSlide], far: Sequence[HeldOutSlide], rule: EvidenceRule, tempering_exponent: float,
         distance: ClassDistance,
@@ -326,8 +308,14 @@ class Acceptance:
         rank = _rank(len(beyond or usual), 1.0 - self.rates.coverage)
         levels = []
         for length in LEVELS:
-            probabilities = sorted(_true_probability(one, length, rule, tempering_exponent) for one in beyond or usual)
-            levels.append(_limits_at(length, usual, beyond, self.rates, probabilities[rank - 1] if rank else 0.0))
+            # Of the true labels at this length of evidence, few are less probable than those of the prediction set.
+            probable = []
+            for slide in beyond or usual:
+                place = slide.place(length)
+                posterior = rule.posterior(slide.means[place], slide.effective_windows[place], tempering_exponent)
+                probable.append(float(posterior[slide.truth]))
+            least = sorted(probable)[rank - 1] if rank else 0.0
+            levels.append(_limits_at(length, usual, beyond, self.rates, least))
         found = replace(self, levels=np.array(levels), distance=distance)
         return replace(found, decided_score=found._fit_decided([*near, *far]))
 
@@ -408,40 +396,23 @@ class Acceptance:
         order = np.argsort(-probabilities, kind='stable')
         return [int(number) for number in order if probabilities[number] >= least]
 
-    def with_slides(
-        self, compared: Array, codes: Codes, conditions: Sequence[SlideConditions], labels: Iterable[str]
-    ) -> Acceptance:
-        """Return the acceptance of a model to which slides were added, by what of them is compared, (n, n_compared)."""
-        distance = self.distance.with_slides(compared, codes) if self.distance else None
-        domain = self.domain.widened(conditions, labels)
-        return replace(self, distance=distance, domain=domain)
-
     def _fit_decided(self, slides: Sequence[HeldOutSlide]) -> float:
         """Return the least score at which slides end early and rarely with a wrong label, disturbed or not."""
         if self.decided_reason:
             return NEVER
-        scores, wrong, disturbed = [], [], []
+        scores = []
         for slide in slides:
             limits = [self.limits(length) for length in slide.effective_windows.tolist()]
             rows = zip(limits, slide.scored.tolist(), strict=True)
             scores.append(np.array([one.score(*row) if one.accepts(*row) else -math.inf for one, row in rows]))
-            wrong.append(~slide.right)
-            disturbed.append(bool(slide.disturbance))
-        of = np.array(disturbed)
+        of = np.array([bool(slide.disturbance) for slide in slides])
         allowed = {kind: int(self.rates.max_error_rate * (of == kind).sum()) for kind in (False, True)}
         tried = np.unique(
             np.quantile([s.max() for s in scores if np.isfinite(s.max())] or [NEVER], np.linspace(0, 1, 50))
         )
         for least in tried.tolist():
             ends = [(score >= least).argmax() if score.max() >= least else -1 for score in scores]
-            errors = np.array([end >= 0 and bool(bad[end]) for end, bad in zip(ends, wrong, strict=True)])
+            errors = np.array([end >= 0 and not slide.right[end] for end, slide in zip(ends, slides, strict=True)])
             if all(errors[of == kind].sum() <= most for kind, most in allowed.items()):
                 return float(least)
         return NEVER
-
-
-def _true_probability(slide: HeldOutSlide, length: float, rule: EvidenceRule, tempering_exponent: float) -> float:
-    """Return how probable the true label of a slide is at a length of evidence."""
-    place = slide.place(length)
-    posterior = rule.log_posterior(slide.means[place], slide.effective_windows[place], tempering_exponent)
-    return float(np.exp(posterior[slide.truth]))

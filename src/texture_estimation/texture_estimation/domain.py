@@ -7,55 +7,18 @@ from __future__ import annotations
 import math
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from texture_core.errors import InvalidData
 from texture_features.feature_set import RunningConditions, SlideConditions
 from texture_features.windows import Interval
 
 # --------------------
-# How far beyond the trained conditions a slide may be made.
-
-
-@dataclass(frozen=True)
-class DomainMargins:
-    """How far an exploration may lie outside the conditions of the training."""
-
-    speed: float = 0.15
-    force: float = 0.3
-    direction_rad: float = 0.35
-    level: float = 1.0
-
-    def __post_init__(self) -> None:
-        for name, value in asdict(self).items():
-            if not 0.0 <= value < math.inf:
-                raise InvalidData(f'the margin {name} of a domain is {value}; 0 or a positive number is needed')
-
-
-# --------------------
-# Intervals of conditions and arcs of directions that slides cover.
+# Intervals of conditions that slides cover.
 
 # Of the slides, at either end of a range: with a hundred slides or more, one odd slide does not widen it.
 ODD_FRACTION = 0.01
-FULL_CIRCLE: Interval = (-math.pi, math.pi)
-
-
-def covered_arcs(directions_rad: Iterable[float], gap_rad: float) -> tuple[Interval, ...]:
-    """Return the arcs that directions cover when gaps of at most `gap_rad` between neighbours count as covered."""
-    ordered = sorted({math.remainder(direction, math.tau) for direction in directions_rad})
-    if not ordered:
-        return ()
-    turned = [*ordered[1:], ordered[0] + math.tau]
-    ends = [place for place, (one, other) in enumerate(zip(ordered, turned, strict=True)) if other - one > gap_rad]
-    if not ends:
-        return (FULL_CIRCLE,)
-    starts = [ordered[(end + 1) % len(ordered)] for end in (ends[-1], *ends[:-1])]
-    return tuple(
-        (start, ordered[end] if ordered[end] >= start else ordered[end] + math.tau)
-        for start, end in zip(starts, ends, strict=True)
-    )
 
 
 def joint_interval(trained: Interval | None, added: Interval | None) -> Interval | None:
@@ -86,12 +49,15 @@ def is_beyond(value: float, interval: Interval | None, margin: float) -> bool:
 # --------------------
 # The domain of a model: under which conditions it was trained, and whether an exploration lies within them.
 
+# How far outside the training conditions a slide may be made; a recipe may have others for speed and force.
+SPEED_MARGIN, FORCE_MARGIN = 0.15, 0.3
+DIRECTION_MARGIN_RAD = 0.35
+LEVEL_MARGIN = 1.0
 # Motions whose direction turns within a window: they cover all directions, and theirs is not compared.
 TURNING_MOTIONS = ('circular',)
 REPLAYS = 'file/'  # a sensor that replays a file is named after the file, not after what measured
 OUTSIDE = 'outside the training'
 ONE_PLACE = 'trained at one place of each surface: elsewhere it may be rejected'
-REACH = {'sessions': 'session', 'places': 'place', 'fingers': 'sensor'}  # and what of a slide is counted
 
 
 @dataclass(frozen=True)
@@ -107,53 +73,44 @@ class Domain:
     sensors: tuple[str, ...] = ()
     speed_m_s: Interval | None = None
     force_n: Interval | None = None
-    directions_rad: tuple[Interval, ...] = ()
+    directions_rad: tuple[float, ...] = ()
     levels: Mapping[str, Interval] = field(default_factory=dict)
     slides: Mapping[str, int] = field(default_factory=dict)
-    margins: DomainMargins = field(default_factory=DomainMargins)
-    reach: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        ranges = {'speed_m_s': self.speed_m_s, 'force_n': self.force_n, **self.levels}
-        for name, interval in ranges.items():
-            if interval is not None and not 0.0 <= interval[0] <= interval[1] < math.inf:
-                raise InvalidData(f'{name} of a domain is {interval}; two numbers from 0 on in rising order are needed')
-        for start, end in self.directions_rad:
-            if not (math.isfinite(start) and 0.0 <= end - start <= math.tau):
-                raise InvalidData(f'an arc of a domain goes from {start} to {end} rad; at most one turn is needed')
+    speed_margin: float = SPEED_MARGIN
+    force_margin: float = FORCE_MARGIN
+    places: int = 0  # or sessions, of the label that has most; 0 if unknown
 
     @classmethod
     def of_slides(
-        cls, conditions: Iterable[SlideConditions], labels: Iterable[str], margins: DomainMargins | None = None
-    ) -> Domain:
+        cls, conditions: Iterable[SlideConditions], labels: Iterable[str], speed_margin: float = SPEED_MARGIN,
+        force_margin: float = FORCE_MARGIN,
+    ) -> Domain:  # fmt: skip
         """Return the domain of a model that is trained on slides."""
         slides, labels = tuple(conditions), tuple(labels)
-        margins = margins or DomainMargins()
         return cls(
             motions=_names(slide.motion for slide in slides),
             sensors=_names(slide.sensor for slide in slides if not slide.sensor.startswith(REPLAYS)),
             speed_m_s=interval_of((slide.speed_m_s, *slide.speed_range_m_s) for slide in slides),
             force_n=interval_of((slide.force_n, *slide.force_range_n) for slide in slides),
-            directions_rad=_directions(slides, margins.direction_rad),
+            directions_rad=_directions(slides),
             levels=_levels(slides),
             slides=dict(Counter(labels)),
-            margins=margins,
-            reach=_reach(slides, labels),
+            places=_places(slides, labels),
+            speed_margin=speed_margin,
+            force_margin=force_margin,
         )
 
     @property
     def reach_reason(self) -> str:
         """Where slides may be rejected for lack of training, in one sentence; '' if unknown."""
-        if not self.reach or any(counts['places'] > 1 or counts['sessions'] > 1 for counts in self.reach.values()):
-            return ''
-        return ONE_PLACE
+        return ONE_PLACE if self.places == 1 else ''
 
     def widened(self, conditions: Sequence[SlideConditions], labels: Iterable[str]) -> Domain:
         """Return the domain with slides that were added after the training.
 
         They widen what is known of the training; what was unknown there is still not compared.
         """
-        new = Domain.of_slides(conditions, labels, self.margins)
+        new = Domain.of_slides(conditions, labels)
         return replace(
             self,
             motions=_names((*self.motions, *new.motions)) if self.motions else (),
@@ -172,46 +129,42 @@ class Domain:
 
     def _deviations(self, conditions: SlideConditions | RunningConditions) -> Iterator[str]:
         speed, force = conditions.speed_m_s, conditions.force_n
-        if is_beyond(speed, self.speed_m_s, self.margins.speed):
+        if is_beyond(speed, self.speed_m_s, self.speed_margin):
             yield f'speed {speed:.3g} m/s, trained {_range(self.speed_m_s)} m/s'
-        if is_beyond(force, self.force_n, self.margins.force):
+        if is_beyond(force, self.force_n, self.force_margin):
             yield f'force {force:.3g} N, trained {_range(self.force_n)} N'
         if self.motions and conditions.motion and conditions.motion not in self.motions:
             yield f"motion '{conditions.motion}', trained {_listed(self.motions)}"
         sensor = '' if conditions.sensor.startswith(REPLAYS) else conditions.sensor
         if self.sensors and sensor and sensor not in self.sensors:
             yield f"sensor '{sensor}', trained {_listed(self.sensors)}"
-        compared = () if conditions.motion in TURNING_MOTIONS or not self.directions_rad else conditions.directions_rad
-        if untrained := [direction for direction in compared if not self._covers(direction)]:
-            yield f'direction {untrained[0]:.3g} rad, trained {" and ".join(map(_range, self.directions_rad))} rad'
+        if self.directions_rad and conditions.motion not in TURNING_MOTIONS:
+            for direction in conditions.directions_rad:
+                away = {abs(math.remainder(direction - trained, math.tau)): trained for trained in self.directions_rad}
+                if min(away) > DIRECTION_MARGIN_RAD:
+                    yield f'direction {direction:.3g} rad, trained {away[min(away)]:.3g} rad'
+                    break
         for channel, rms, *_ in conditions.levels:
             trained = self.levels.get(channel)
-            if is_beyond(rms, trained, self.margins.level):
+            if is_beyond(rms, trained, LEVEL_MARGIN):
                 yield f'signal level {rms:.3g} of {channel}, trained {_range(trained)}'
 
-    def _covers(self, direction_rad: float) -> bool:
-        margin = self.margins.direction_rad
-        for start, end in self.directions_rad:
-            if (direction_rad - start + margin) % math.tau <= end - start + 2.0 * margin:
-                return True
-        return False
 
-
-def _directions(slides: Sequence[SlideConditions], margin_rad: float) -> tuple[Interval, ...]:
+def _directions(slides: Sequence[SlideConditions]) -> tuple[float, ...]:
+    """Return the directions of slides; none where a motion has all of them."""
     if any(slide.motion in TURNING_MOTIONS for slide in slides):
-        return (FULL_CIRCLE,)
-    return covered_arcs((angle for slide in slides for angle in slide.directions_rad), 2.0 * margin_rad)
+        return ()
+    return tuple(sorted({angle for slide in slides for angle in slide.directions_rad}))
 
 
-def _reach(slides: Sequence[SlideConditions], labels: Sequence[str]) -> dict[str, dict[str, int]]:
-    """Return how many sessions, places and fingers each label has; one session per slide counts as none."""
-    found = {}
-    for label in dict.fromkeys(labels):
+def _places(slides: Sequence[SlideConditions], labels: Sequence[str]) -> int:
+    """Return the number of places or sessions of the label that has most; one session per slide counts as one."""
+    most = 0
+    for label in set(labels):
         of_label = [slide for slide, of in zip(slides, labels, strict=True) if of == label]
-        names = {kind: {getattr(slide, name) for slide in of_label} for kind, name in REACH.items()}
-        counts = {kind: len(each) for kind, each in names.items()}
-        found[label] = {**counts, 'sessions': counts['sessions'] if counts['sessions'] < len(of_label) else 1}
-    return found
+        sessions = len({slide.session for slide in of_label})
+        most = max(most, len({slide.place for slide in of_label}), sessions if sessions < len(of_label) else 1)
+    return most
 
 
 def _levels(slides: Sequence[SlideConditions]) -> dict[str, Interval]:

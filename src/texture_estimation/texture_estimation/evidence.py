@@ -10,9 +10,9 @@ import numpy as np
 
 from texture_core.types import NANOSECONDS, Array, FeatureVector, Rejection, TextureEstimate
 from texture_estimation.acceptance import SlideDistance, margin_of
-from texture_estimation.evidence_rules import GroupedEvidence
+from texture_estimation.evidence_rules import GroupedEvidence, followed
 from texture_estimation.gaussians import GaussianClasses, SlideMoments
-from texture_estimation.learners.learner import is_tied
+from texture_estimation.learners.learner import trust
 from texture_estimation.model import LEAST_PROBABILITY, TextureModel
 from texture_features.feature_set import RunningConditions, fingerprint_difference
 from texture_features.windows import WindowParams
@@ -44,13 +44,9 @@ def single_decisions(model: TextureModel, values: Array) -> list[str]:
     rule = model.recipe.evidence
     if not rule.group or not len(values):
         return model.decide(values) if len(values) else []
-    evidence = rule.window_evidence(model.predict_log_proba(values))
-    complete = len(values) // rule.group
-    groups = evidence[: complete * rule.group].reshape(complete, rule.group, -1) if complete else evidence[None]
-    posteriors = rule.log_posterior(groups.mean(axis=1), float(groups.shape[1]), tempering_exponent=1.0)
-    tied = is_tied(posteriors).tolist()
-    best = posteriors.argmax(axis=-1).tolist()
-    return ['' if none else model.labels[index] for index, none in zip(best, tied, strict=True)]
+    means, windows = followed(rule, rule.window_evidence(model.predict_log_proba(values)), 1.0)
+    complete = slice(rule.group - 1, None, rule.group) if len(values) >= rule.group else slice(-1, None)
+    return model.best_labels(rule.log_posterior(means[complete], windows[complete, None], tempering_exponent=1.0))
 
 
 class EvidenceAccumulator:
@@ -89,15 +85,14 @@ class EvidenceAccumulator:
         self._exploration_id = exploration_id
         self._over = False
         self._windows = self._evidence_ns = self._window_ns = self._end_ns = 0
-        self._trusted_ns = 0.0
         self._misfit = False  # features of another set came
-        self._message = '' if self.model else NO_MODEL
-        self._evidence = GroupedEvidence(
-            self.model.n_predicted if self.model else 0, self.model.recipe.evidence.group if self.model else 0
-        )
-        self._moments = SlideMoments(len(self.model.names)) if self.model and self.model.added_slides else None
-        distance = self.model.active_acceptance.distance if self.model else None
-        self._distance = SlideDistance(distance) if distance else None
+        self._message = NO_MODEL
+        if (model := self.model) is not None:
+            self._message = ''
+            self._evidence = GroupedEvidence(model.recipe.evidence, model.n_predicted)
+            self._moments = SlideMoments(len(model.names)) if model.added_slides else None
+            distance = model.active_acceptance.distance
+            self._distance = SlideDistance(distance) if distance else None
         self._conditions = RunningConditions()
         self._deviation = ''  # of these conditions from those of the training
 
@@ -118,17 +113,13 @@ class EvidenceAccumulator:
         self._conditions.update(vector)
         self._deviation = model.active_acceptance.domain.deviation(self._conditions)
         scores, compared = model.predict_and_compare(vector.values)
-        window_evidence = model.recipe.evidence.window_evidence(scores)
         self._windows += 1
         self._window_ns = round(vector.window_s * NANOSECONDS)
         end = vector.start_ns + self._window_ns
-        new_ns = max(0, end - max(vector.start_ns, self._end_ns))
-        self._evidence_ns += new_ns
+        self._evidence_ns += max(0, end - max(vector.start_ns, self._end_ns))
         effective_windows = self._evidence_ns / self._window_ns
-        trusted = model.trust(vector.values)
-        self._trusted_ns += trusted * new_ns
-        weight = model.recipe.evidence.window_weight(effective_windows) * trusted
-        self._evidence.add(window_evidence, new_ns / NANOSECONDS, weight)
+        evidence = model.recipe.evidence.window_evidence(scores)
+        self._evidence.add(evidence, effective_windows, float(trust(model.predictor, vector.values)))
         self._end_ns = max(end, self._end_ns)
         if self._moments is not None:
             self._moments.add(vector.values)
@@ -149,11 +140,7 @@ class EvidenceAccumulator:
             )
         # The effective number of windows follows from the sliding time that they cover, whatever their weights.
         effective_windows = self._evidence_ns / self._window_ns
-        # As long as the weights of the windows do not add up to one, their mean counts less.
-        mean = self._evidence.mean
-        if self._trusted_ns < self._window_ns:
-            mean = mean * (self._trusted_ns / self._window_ns)
-        deciding = self._evidence.time_s * NANOSECONDS / self._window_ns
+        mean, deciding = self._evidence.mean, self._evidence.windows
         probabilities = model.recipe.evidence.posterior(mean, deciding, model.tempering_exponent)
         added, moments = model.slide_gaussians, self._moments
         if moments is not None and added is not None:

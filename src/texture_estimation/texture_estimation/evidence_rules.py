@@ -81,13 +81,6 @@ class SoftVote(EvidenceRule):
         """Return log softmax(n^tempering_exponent · mean log p), the last axis being the textures."""
         return log_softmax(mean_evidence * effective_windows**tempering_exponent)
 
-    def posterior(self, mean_evidence: Array, effective_windows: float, tempering_exponent: float) -> Array:
-        """Return softmax(n^tempering_exponent · mean log p)."""
-        scores = mean_evidence * effective_windows**tempering_exponent
-        fractions: Array = np.exp(scores - np.maximum.reduce(scores, axis=-1, keepdims=True))
-        fractions /= np.add.reduce(fractions, axis=-1, keepdims=True)
-        return fractions
-
 
 @dataclass(frozen=True)
 class MajorityVote(EvidenceRule):
@@ -147,48 +140,46 @@ class MajorityVote(EvidenceRule):
 
 
 class GroupedEvidence:
-    """Sum of the evidence of windows: of all so far, or of the newest complete group.
+    """Mean evidence of the windows of a slide, live and offline: of all so far, or of the newest complete group.
 
-    While the first group grows, it counts as it is.
+    While the first group grows, it counts as it is. As long as the windows add up to less than one that is trusted, the
+    mean counts less.
     """
 
-    def __init__(self, n_labels: int, group: int = 0) -> None:
-        self._group = group
-        self._sum, self._count, self._weight, self._time_s = np.zeros(n_labels), 0, 0.0, 0.0  # of the newest group
+    def __init__(self, rule: EvidenceRule, n_labels: int) -> None:
+        self._rule = rule
+        self._sum, self._count, self._weight, self._begin = np.zeros(n_labels), 0, 0.0, 0.0  # of the newest group
+        self._all = self._trusted = 0.0  # effective windows
         self._complete = False
         self.mean: Array = self._sum
-        self.time_s = 0.0
+        self.windows = 0.0  # that the mean rests on
 
-    def add(self, evidence: Array, new_s: float, weight: float = 1.0) -> None:
-        """Add the evidence of a window, (n_labels,), which adds so much new sliding time."""
-        if self._count == self._group and self._complete:
-            self._sum, self._count, self._weight, self._time_s = np.zeros(len(evidence)), 0, 0.0, 0.0
-        self._sum += evidence if weight == 1.0 else weight * evidence
+    def add(self, evidence: Array, effective_windows: float, trusted: float = 1.0) -> None:
+        """Add the evidence of a window, (n_labels,), with which the slide has this many effective windows."""
+        group = self._rule.group
+        if self._count == group and self._complete:
+            self._sum, self._count, self._weight, self._begin = np.zeros(len(evidence)), 0, 0.0, self._all
+        weight = self._rule.window_weight(effective_windows) * trusted
+        self._sum += weight * evidence
         self._weight += weight
         self._count += 1
-        self._time_s += new_s
-        self._complete |= self._count == self._group
-        if not self._complete or self._count == self._group:
-            self.mean, self.time_s = self._sum / self._weight, self._time_s
+        self._trusted += trusted * (effective_windows - self._all)
+        self._all = effective_windows
+        self._complete |= self._count == group
+        if not self._complete or self._count == group:
+            self.mean = self._sum / self._weight * min(self._trusted, 1.0)
+            self.windows = effective_windows - self._begin
 
 
 def followed(
     rule: EvidenceRule, evidence: Array, hop_ratio: float, trusted: Array | float = 1.0
 ) -> tuple[Array, Array]:
     """Return the mean evidence of a slide after each window, and the effective window count that it rests on."""
-    counts = 1 + np.arange(len(evidence))
-    if rule.group:
-        first = np.maximum(counts // rule.group - 1, 0) * rule.group
-        stop = np.where(counts < rule.group, counts, first + rule.group)
-        newest = np.stack([evidence[one:other].mean(axis=0) for one, other in zip(first, stop, strict=True)])
-        return newest, 1.0 + (stop - first - 1.0) * hop_ratio
-    effective_windows: Array = 1.0 + np.arange(len(evidence), dtype=np.float64) * hop_ratio
-    weights = np.broadcast_to(trusted * rule.window_weight(effective_windows), len(evidence))[:, None]
-    means: Array = np.cumsum(weights * evidence, axis=0) / np.cumsum(weights, axis=0)
-    if np.ndim(trusted):
-        added = np.cumsum(trusted * np.diff(effective_windows, prepend=0.0))
-        means *= np.minimum(added, 1.0)[:, None]
-    return means, effective_windows
+    so_far, means, windows = GroupedEvidence(rule, evidence.shape[1]), np.empty_like(evidence), np.empty(len(evidence))
+    for place, trust in enumerate(np.broadcast_to(trusted, len(evidence)).tolist()):
+        so_far.add(evidence[place], 1.0 + place * hop_ratio, trust)
+        means[place], windows[place] = so_far.mean, so_far.windows
+    return means, windows
 
 
 EVIDENCE_RULES: Mapping[str, type[EvidenceRule]] = {

@@ -185,11 +185,6 @@ class SlideGaussians:
         probabilities[..., self.added] += proba[..., self.n_trained :]
         return probabilities
 
-    def check(self, mean: Array) -> None:
-        """Raise ValueError unless a slide with this mean, (n_features,), has finite probabilities at every length."""
-        if not all(np.isfinite(self.log_proba(mean, np.zeros_like(mean), length)).all() for length in self.lengths):
-            raise ValueError('its values are too large to be features')
-
     def _described(self, values: Array, hop_ratio: float) -> list[Array]:
         """Return the descriptor of the start of a slide of each length; the last one is of the whole slide."""
         ends = [*(window_count(length, hop_ratio) for length in self.lengths[:-1]), len(values)]
@@ -290,23 +285,13 @@ class ClassDistance:
             found[code] = (points.T, 0.5 * np.einsum('ij,ij->i', points, points))
         return found
 
-    @cached_property
-    def _directions(self) -> Array:
-        """Projection by columns: so a product with one slide is faster."""
-        return np.asfortranarray(self.projection)
-
-    @cached_property
-    def _nearer(self) -> Array:
-        """What the square along each direction counts less about the centre than about a slide, (n_directions,)."""
-        return 1.0 - self.weights
-
     def score(self, mean: Array, code: int) -> Array:
         """Return the score, (...), of mean features (..., n_features) for a class; infinite without its slides."""
         found = self._of_class.get(code)
         if found is None:
             return np.full(mean.shape[:-1], np.inf)
         points, half_squares = found
-        projected = mean @ self._directions
+        projected = mean @ self.projection
         projected -= self.centre
         # Half the squared distances, less half the square of what is away from the centre.
         halves = half_squares - projected @ points
@@ -314,7 +299,7 @@ class ClassDistance:
             halves.partition(NEAREST - 1)
             halves = halves[..., :NEAREST]
         nearest: Array = np.add.reduce(halves, axis=-1) * (2.0 / halves.shape[-1])
-        nearest += (projected * projected) @ self._nearer
+        nearest += (projected * projected) @ (1.0 - self.weights)
         return nearest
 
     def with_slides(self, means: Array, classes: Codes) -> ClassDistance:

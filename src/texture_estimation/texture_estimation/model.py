@@ -364,14 +364,6 @@ class TrainingExamples:
         kept = np.concatenate([rows[spread(len(rows))] for rows in of_label])
         return cls(values[kept].astype(np.float32), codes[kept], slides[kept])
 
-    def check(self, n_features: int, n_labels: int) -> None:
-        """Raise ValueError unless they are examples of this many features and labels."""
-        n = len(self.codes)
-        if self.values.shape != (n, n_features) or self.slides.shape != (n,) or self.codes.shape != (n,):
-            raise ValueError(f'examples of shape {self.values.shape} have {n} labels and {len(self.slides)} slides')
-        if not n or self.codes.min() < 0 or self.codes.max() >= n_labels or not np.isfinite(self.values).all():
-            raise ValueError('examples have labels that the model has not, or values that are not finite')
-
 
 def spread(count: int, most: int = MAX_EXAMPLES) -> Codes:
     """Return at most `most` of the numbers 0 to count - 1, evenly spread."""
@@ -453,14 +445,14 @@ class TextureModel(StoredModel):
     @cached_property
     def active_acceptance(self) -> Acceptance:
         """The acceptance with the added slides."""
-        added = self.added_slides
+        added, distance = self.added_slides, self.acceptance.distance
         if not added:
             return self.acceptance
-        means = [compared_start(self.compared(slide.values), self._overlap) for slide in added]
-        codes = np.array([self.labels.index(slide.label) for slide in added])
-        return self.acceptance.with_slides(
-            np.stack(means), codes, [slide.conditions for slide in added], [slide.label for slide in added]
-        )
+        if distance is not None:
+            means = [compared_start(self.compared(slide.values), self._overlap) for slide in added]
+            distance = distance.with_slides(np.stack(means), np.array([self.labels.index(x.label) for x in added]))
+        domain = self.acceptance.domain.widened([one.conditions for one in added], [one.label for one in added])
+        return replace(self.acceptance, distance=distance, domain=domain)
 
     def acceptance_of(self, number: int) -> Acceptance:
         """Return the acceptance for the label of this number: few slides of an added one show little."""
@@ -495,12 +487,6 @@ class TextureModel(StoredModel):
             return self.predictor.scores(activations), activations
         return self.predictor(X), self.compared(X)
 
-    @cached_property
-    def trust(self) -> Callable[[Array], float]:
-        """How much a window of these features, (n_features,), counts in its slide."""
-        of: Callable[[Array], float] | None = getattr(self.predictor, 'trust', None)
-        return of or (lambda _: 1.0)
-
     def predict_log_proba(self, X: Array) -> Array:
         """Return the log-probability of each label, (..., n_labels) of (..., n_features).
 
@@ -527,10 +513,13 @@ class TextureModel(StoredModel):
         X : (n_features,), or (n, n_features)
             Of the windows of one slide.
         """
-        log_probabilities = self.predict_log_proba(X)
+        return self.best_labels(self.predict_log_proba(X))
+
+    def best_labels(self, log_probabilities: Array) -> list[str]:
+        """Return the most probable label of each row, (n, n_labels); '' where several labels are equally good."""
         best = log_probabilities.argmax(axis=-1).tolist()
-        none = is_tied(log_probabilities).tolist()
-        return ['' if tied else self.labels[index] for index, tied in zip(best, none, strict=True)]
+        tied = is_tied(log_probabilities).tolist()
+        return ['' if none else self.labels[index] for index, none in zip(best, tied, strict=True)]
 
     def with_added_slides(self, added_slides: tuple[AddedSlide, ...]) -> TextureModel:
         """Return the model with these added slides in place of those it has.
@@ -576,7 +565,7 @@ class TextureModel(StoredModel):
         return SlideGaussians.fit(known.values.astype(np.float64), known.codes, known.slides, hop_ratio, self._compared)
 
     def validate(self) -> None:
-        """Use every part once on a window of zeros: what does not fit the others, or is no number, raises now.
+        """Predict and assess a window of zeros: parts that do not fit the others, or hold no numbers, raise now.
 
         Raises
         ------
@@ -592,12 +581,6 @@ class TextureModel(StoredModel):
             distance.add(self.compared(nothing), 1.0)
             self.acceptance.assess(0.0, distance.to(0), 1.0)
             self.acceptance.members(np.exp(answer), 1.0)
-        if self.slide_gaussians is not None:
-            self.slide_gaussians.check(nothing)
-        if self.next_touch_model is not None:
-            self.next_touch_model.check(nothing)
-        if self.examples is not None:
-            self.examples.check(len(self.names), len(self.labels))
         if not 0.0 <= self.tempering_exponent <= 1.0:
             raise ModelMismatch(f'the exponent of its evidence is {self.tempering_exponent}; allowed is 0 to 1')
 

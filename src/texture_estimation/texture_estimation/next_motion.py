@@ -122,12 +122,6 @@ class NextTouchModel:
         most = max(choice.information for choice in choices)
         return min((c for c in choices if c.information >= most - SAME_NATS), key=lambda c: c.motion.duration_s)
 
-    def check(self, values: Array) -> None:
-        """Raise InvalidData if the update with these mean features, (n_features,), is not finite."""
-        for motion in self.motions:
-            if np.isnan(self.update(self.uniform_log_prior, motion, values)).any():
-                raise InvalidData(f'what textures look like under {motion} is not finite')
-
 
 def slide_values(vectors: Sequence[FeatureVector], feature_set: str) -> Array:
     """Return the mean features of a slide, (n_features,), from those of its windows."""

@@ -12,7 +12,7 @@ from typing import Any
 from texture_core.config import from_mapping, param, unknown_name
 from texture_core.errors import InvalidParameter
 from texture_estimation.acceptance import Rates
-from texture_estimation.domain import DomainMargins
+from texture_estimation.domain import FORCE_MARGIN, SPEED_MARGIN
 from texture_estimation.evidence_rules import EVIDENCE_RULES, EvidenceRule
 from texture_estimation.learners.discriminant import Discriminant, ForceDiscriminant
 from texture_estimation.learners.learner import Learner, extras_of
@@ -112,14 +112,14 @@ class DecisionParams(TrainingParams):
         high=10.0,
     )
     speed_margin: float = param(
-        0.15,
+        SPEED_MARGIN,
         'How far the speed of an exploration may lie outside the speeds of the training, relative to them; '
         'beyond, the estimate is rejected as outside the training.',
         low=0.0,
         high=100.0,
     )
     force_margin: float = param(
-        0.3,
+        FORCE_MARGIN,
         'How far the force of an exploration may lie outside the forces of the training, relative to them; '
         'beyond, the estimate is rejected as outside the training.',
         low=0.0,
@@ -144,11 +144,6 @@ class DecisionParams(TrainingParams):
     def rates(self) -> Rates:
         """Allowed error rates of the decisions about a slide."""
         return Rates(self.max_accepted_wrong, self.false_rejection_rate, self.max_error_rate, self.coverage)
-
-    @property
-    def domain_margins(self) -> DomainMargins:
-        """How far an exploration may lie outside the conditions of the training."""
-        return DomainMargins(self.speed_margin, self.force_margin)
 
 
 @dataclass(frozen=True)

@@ -383,7 +383,9 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
         fitted, codes, groups, recipe.evidence, hop_ratio, temperature=fitted.temperature
     )
     calibrated, truth = fitted, codes
-    domain = Domain.of_slides(conditions, of_slides, recipe.training.domain_margins)
+    domain = Domain.of_slides(
+        conditions, of_slides, speed_margin=recipe.training.speed_margin, force_margin=recipe.training.force_margin
+    )
     acceptance = Acceptance(0 if fitted.held_out is None else len(slides), recipe.training.rates, domain)
     if not acceptance.reason:
         followed_slides = Followed(bound, examples)
@@ -426,6 +428,31 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
         },
         examples=TrainingExamples.of(examples.values, codes, groups),
     )
+
+
+DAY_SUFFIX = '-today'
+
+
+def adapted(model: TextureModel, training: LabelledFeatures, today: LabelledFeatures) -> TextureModel:
+    """Return the model trained again with each surface shifted, in the mean of its features, to its slides of today.
+
+    A surface without a slide of today is shifted as the others are on average. Nothing shows which slides of today
+    would be unknown, so none is accepted.
+    """
+    labels = model.trained_labels
+    if strange := sorted(set(today.labels.tolist()) - set(labels)):
+        raise InvalidData(
+            f"'{strange[0]}' is not a trained surface; label the slides of today with {', '.join(labels)}"
+        )
+    shifts: dict[str, Array] = {
+        label: today.values[today.labels == label].mean(axis=0) - training.values[training.labels == label].mean(axis=0)
+        for label in np.unique(today.labels).tolist()
+    }
+    usual: Array = np.mean(list(shifts.values()), axis=0)
+    values = training.values + np.stack([shifts.get(label, usual) for label in training.labels.tolist()])
+    shifted = replace(training, values=values, augmented=None, resized=None)
+    found = train(model.recipe, shifted, f'{model.name}{DAY_SUFFIX}')
+    return replace(found, acceptance=Acceptance(0, found.acceptance.rates, found.acceptance.domain))
 
 
 def _check(examples: LabelledFeatures) -> None:

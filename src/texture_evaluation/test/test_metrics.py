@@ -107,8 +107,13 @@ def test_rejections_are_counted_by_their_reason_on_screen_and_in_the_figures() -
 
 
 def test_both_lists_of_labels_are_named_where_no_tested_surface_was_trained() -> None:
-    report = EvaluationReport(('a', 'b'), [], [slide('felt', 'a'), slide('cork', 'a', known=False)], np.ones(2))
+    slides, few = (
+        [slide('felt', 'a'), slide('cork', 'a', known=False)],
+        'too little training: 12 slides could be held out',
+    )
+    report = EvaluationReport(('a', 'b'), [], slides, np.ones(2), too_little_training=few)
     lines = summary(report)
     assert 'no tested surface was trained, so there is no accuracy: trained are a, b; tested are cork, felt' in lines
     assert 'slides over other surfaces accepted: 50.0 %' in lines
+    assert lines[-1] == report.as_json()['too_little_training'] == few
     assert (report.as_json()['tested'], report.as_json()['rejections_of_untrained']) == (['cork', 'felt'], {'novel': 1})

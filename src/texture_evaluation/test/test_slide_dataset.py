@@ -49,13 +49,6 @@ def write(path: Path, dataset: SlideDataset) -> Path:
     return path
 
 
-def test_arrays_come_back_as_they_were_given() -> None:
-    samples, labels = from_arrays().to_numpy('signal')
-    assert labels.tolist() == LABELS
-    for given, returned in zip(arrays(), samples, strict=True):
-        np.testing.assert_array_equal(returned, given)
-
-
 def test_a_bag_gives_the_same_data_set_as_the_arrays_that_it_holds(tmp_path: Path) -> None:
     given = from_arrays()
     read = SlideDataset.from_bags([write(tmp_path / 'bag', given)])
@@ -127,13 +120,6 @@ def test_a_missing_input_is_refused_with_what_there_is() -> None:
 def test_arrays_that_contradict_each_other_are_refused(arguments: tuple, sentence: str) -> None:
     with pytest.raises(InvalidData, match=sentence):
         SlideDataset.from_arrays(*arguments)
-
-
-def test_windows_carry_the_speed_and_force_of_the_slide() -> None:
-    [(slide, events), *_] = from_arrays().windows(FEATURES)
-    window = events[0]
-    assert isinstance(window, CutWindow)
-    assert (slide.name, window.speed_m_s, window.force_n) == ('cork/1', 0.02, 1.0)
 
 
 def test_lost_samples_leave_windows_out_but_are_refused_where_all_are_needed(tmp_path: Path) -> None:

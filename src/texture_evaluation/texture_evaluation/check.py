@@ -12,6 +12,9 @@ import numpy as np
 from texture_core.config import write_json
 from texture_core.errors import InvalidData
 from texture_core.types import Array, ExplorationRequest, Phase
+from texture_estimation.model import load_model, model_stem
+from texture_estimation.training import DAY_SUFFIX, adapted
+from texture_evaluation.train import training_examples
 from texture_features.correction import (
     CORRECTION,
     RESPONSE_DB,
@@ -23,6 +26,7 @@ from texture_features.correction import (
     file_next_to,
     write_reference,
 )
+from texture_recordings.dataset import SlideDataset
 from texture_recordings.slides import LabelledSlide, SlideSamples
 
 TOUCH_NS = 200_000_000  # the skin feels a touch before the arm does
@@ -101,6 +105,16 @@ def check_finger(
         return False, f'{sentence}. Clean or replace the skin, or correct the model by --correct'
     write_json(Correction.of(found).as_mapping(), correction)
     return False, f"{sentence}. The model is corrected, '{correction}': start it again, with its card as the recipe"
+
+
+def adapt_to_today(model: str | Path, bags: Sequence[str | Path], today: Sequence[str | Path]) -> str:
+    """Save MODEL-today, adapted by the labelled slides of today, and return in a sentence what it is."""
+    trained = load_model(model)
+    feature_set, out = trained.recipe.feature_set, f'{model_stem(model)}{DAY_SUFFIX}'
+    shots = SlideDataset.from_bags(today, topics=feature_set.topics)
+    examples = training_examples(trained.recipe, SlideDataset.from_bags(bags, topics=feature_set.topics))
+    adapted(trained, examples, shots.features(feature_set)).save(out)
+    return f"'{out}' is adapted to {len(shots)} slides of today; it names surfaces and rejects them all"
 
 
 def _faults(found: Mapping[str, InputComparison]) -> list[str]:

@@ -11,7 +11,7 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed, parallel_config
@@ -461,19 +461,12 @@ def _draw_accuracies(axes: Any, results: Sequence[CrossValidation]) -> None:
 TEST_SIZE = 0.25  # of a random split
 
 
-class Splitter(Protocol):
-    """Interface of scikit-learn's splitters."""
-
-    def split(self, X: Any, y: Any, groups: Any) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-        """Yield train and test rows."""
-
-
 @dataclass(frozen=True)
 class Split:
     """A splitter by name."""
 
     name: str
-    splitter: Splitter
+    splitter: Any  # of scikit-learn, or with its interface
     groups: str | AnyArray = 'slide'
     parts: int = 1
 
@@ -529,7 +522,7 @@ SPLIT_ADVICE = 'if each session holds one surface, set `session` in the mapping 
 
 
 def split_slides(
-    dataset: SlideDataset, splitter: Splitter, groups: str | AnyArray = 'slide'
+    dataset: SlideDataset, splitter: Any, groups: str | AnyArray = 'slide'
 ) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
     """Return the training and test slides of each split, by their index in the data set.
 
@@ -614,7 +607,7 @@ def slide_groups(dataset: SlideDataset, groups: str | AnyArray) -> AnyArray:
 def cross_validate(
     recipe: Recipe,
     dataset: SlideDataset,
-    splitter: Splitter,
+    splitter: Any,
     n_jobs: int | None = None,
     *,
     groups: str | AnyArray = 'slide',

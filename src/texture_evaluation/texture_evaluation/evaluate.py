@@ -46,6 +46,7 @@ class EvaluationReport:
     shift: str = ''
     trained_on: tuple[str, ...] = ()
     clusters: Sequence[str] | None = None
+    too_little_training: str = ''  # how many slides there are and how many are needed
 
     @property
     def confusion(self) -> AnyArray:
@@ -64,6 +65,7 @@ class EvaluationReport:
         return {
             'shift': self.shift,
             'trained_on': list(self.trained_on),
+            'too_little_training': self.too_little_training,
             **figures(self.known, self.clusters),
             'early': metrics.early_decision(self.known) if self.known else nothing,
             'calibration_error': metrics.calibration_error(self.known),
@@ -123,6 +125,7 @@ def evaluate_dataset(model: TextureModel, dataset: SlideDataset) -> EvaluationRe
         tare_faults=tuple(dataset.tare_faults(model.recipe.feature_set)),
         shift=crossed if sessions else '',
         trained_on=tuple(slide.name for slide in results if slide_digest(slide) in digests),
+        too_little_training=model.acceptance.reason,
         clusters=[one.name if one.session in sessions else f'{one.surface} {one.session}' for one in known],
     )
 
@@ -292,7 +295,7 @@ def summary(report: EvaluationReport) -> list[str]:
         )
     if report.unusable:
         lines.append(f'without a usable window, and not counted: {", ".join(report.unusable)}')
-    return [*lines, *report.tare_faults]
+    return [*lines, *report.tare_faults, *filter(None, [report.too_little_training])]
 
 
 def percent(fraction: float | None) -> str:

@@ -101,8 +101,6 @@ class InputStatistics:
             name: np.array(content[name], dtype=np.float64) for name in ('log_power', 'rms', 'rest_rms', 'rest_level')
         }
         channels = tuple(map(str, content['channels']))
-        if arrays['log_power'].shape[1:] != (len(channels),) or not np.isfinite(arrays['log_power']).all():
-            raise ValueError('its spectrum does not fit its channels')
         return cls(str(content['sensor']), float(content['rate_hz']), channels, **arrays)
 
 
@@ -238,7 +236,6 @@ class Correction:
 CORRECTION, REFERENCE = 'correction', 'reference'
 SLIDE_NUMBERS = ('speed_m_s', 'force_n', 'distance_m', 'direction_rad')  # by which a slide over the plate is repeated
 MOST_BYTES = 4_000_000
-MOST_DB = 60.0  # of a response that can be taken out
 CORRECTED = ' corrected='  # before the fingerprint of a correction, in that of features
 
 
@@ -260,12 +257,6 @@ def read_correction(model: str | Path) -> Correction | None:
             {str(topic): np.array(one[key], dtype=np.float64) for topic, one in content.items()}
             for key in ('frequencies_hz', 'response_db')
         )
-        for topic, response in response_db.items():
-            hertz = frequencies_hz[topic]
-            if response.ndim != 2 or len(response) != len(hertz) or not (np.diff(hertz) > 0).all():
-                raise ValueError(f"the response of '{topic}' does not fit its frequencies")
-            if not (np.abs(response) <= MOST_DB).all():
-                raise ValueError(f"the response of '{topic}' is beyond {MOST_DB:g} dB")
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise ModelMismatch(
             f"correction '{path}' cannot be used: {error}; remove it, and check the finger again"
@@ -294,9 +285,6 @@ def read_reference(model: str | Path) -> tuple[dict[str, InputStatistics], dict[
     try:
         content = load_json(path, MOST_BYTES)
         numbers = {str(name): float(value) for name, value in content['slide'].items()}
-        for name, value in numbers.items():
-            if name not in SLIDE_NUMBERS or not math.isfinite(value) or (value < 0.0 and name != 'direction_rad'):
-                raise ValueError(f"its slide has '{name}' {value}")
         return {str(topic): InputStatistics.from_mapping(one) for topic, one in content['inputs'].items()}, numbers
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise ModelMismatch(f"reference '{path}' cannot be used: {error}; store it again by --store") from error

@@ -39,7 +39,7 @@ from texture_core.types import ExplorationRequest, ExplorationState, TextureEsti
 from texture_estimation.model import load_model
 from texture_estimation.next_motion import slide_values
 from texture_evaluation import collection
-from texture_evaluation.check import check_finger, store_reference
+from texture_evaluation.check import adapt_to_today, check_finger, store_reference
 from texture_exploration.motions import MOTIONS
 from texture_exploration.presets import load_preset
 from texture_features.correction import read_reference
@@ -416,11 +416,18 @@ def _configure_check(parser: argparse.ArgumentParser) -> None:
     for option, (_, unit, meaning, usual) in PLATE_NUMBERS.items():
         shown = f'{meaning}, {unit}; default: that of the reference, or {usual:g}'
         parser.add_argument(f'--{option}', type=float, help=shown)
+    parser.add_argument(
+        '--today', nargs='+', metavar='BAG', help='bags of today with a labelled slide of each surface; needs --trained'
+    )
+    parser.add_argument('--trained', nargs='+', metavar='BAG', help='bags on which it was trained')
     add_namespace(parser)
 
 
 def _check(options: argparse.Namespace) -> int:
-    """Check or store; return 1 if the finger is not as trained and was not corrected."""
+    """Check, store or adapt; return 1 if the finger is not as trained and was not corrected."""
+    if options.today or options.trained:
+        print(adapt_to_today(options.model, options.trained or (), options.today or ()))
+        return 0
     # Report what is missing before the robot moves.
     topics = load_model(options.model).recipe.feature_set.topics
     reference, made = ({}, {}) if options.store else read_reference(options.model)
