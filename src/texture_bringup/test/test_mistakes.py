@@ -28,6 +28,8 @@ def data(tmp_path_factory):
     assert main(['train', 'default', *bags, '-o', str(folder / 'fast')]) == 0
     assert main(['train', 'vibration-and-taxels', *bags, '-o', str(folder / 'all')]) == 0
     os.mkfifo(folder / 'pipe')
+    (folder / 'old.added').mkdir()
+    (folder / 'old.added' / '1.json').touch()
     return folder
 
 
@@ -110,6 +112,7 @@ def test_a_model_that_needs_the_slow_channels_refuses_a_bag_without_them(data, c
         ('cross-validate stratified:2 default two-fingers glass leather', "has no '"),
         ('cross-validate leave-one-out:speed default glass leather', "all are of one group, '0.05'"),
         ('train default glass leather -o fast', "'fast.npz' exists; give another name, or --force to replace it"),
+        ('train default glass leather -o old', "slides were added to an earlier model, in 'old.added'; move them away"),
         ('train default glass leather -o no/x', "there is no folder 'no' for the model"),
         ('check fast', 'store that slide by `texture check fast --store`'),
         ('trian', "did you mean 'train'?"),

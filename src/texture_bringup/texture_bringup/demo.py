@@ -161,7 +161,8 @@ def _clear(folder: Path) -> None:
     """Make the folder; remove what an earlier demonstration has left there, and nothing else."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        shutil.rmtree(folder / TRAINING, ignore_errors=True)
+        for left in (TRAINING, f'{MODEL}.added'):
+            shutil.rmtree(folder / left, ignore_errors=True)
         models = (f'{name}{ending}' for name in (MODEL, ROUGHNESS) for ending in ('.npz', '.json'))
         for file in (PICTURE, LOG, GRADES, *models):
             (folder / file).unlink(missing_ok=True)
