@@ -288,7 +288,7 @@ def _chart(runs: Sequence[tuple[Any, ...]], stages: Sequence[int], new: int, pat
                 right = 100 * np.array([[scores[stage][which][what] for scores, *_ in runs] for stage in stages])
                 axes.plot(stages, right.mean(axis=1), dashes, marker='o', color=colour, label=f'{how}: {what}')
                 axes.fill_between(stages, right.min(axis=1), right.max(axis=1), color=colour, alpha=0.15, linewidth=0)
-        axes.set(xscale='log', xlabel='slides of each new material', ylabel='accuracy (%), range of the random choices')
+        axes.set(xscale='log', xlabel='slides of each new material', ylabel='right (%), range of draws')
         axes.set_ylim(None, 101)
         axes.set_xticks(stages, [f'{stage}' for stage in stages])
         axes.minorticks_off()

@@ -469,7 +469,7 @@ def stability_chart(
 
 def limit_chart(limit: Mapping[str, Array], path: Path) -> Path:
     """Draw the gain from which the loop is unstable over its delay, predicted and simulated, and the chosen gains."""
-    with chart(path, (7.0, 5.0), points=10.5) as figure:
+    with chart(path, (8.0, 5.0)) as figure:
         axes = figure.subplots()
         delay_ms = 1000 * limit['delay_s']
         rows = zip(limit['stiffness_n_m'], limit['predicted'], limit['simulated'], COLOURS, strict=False)
@@ -482,8 +482,8 @@ def limit_chart(limit: Mapping[str, Array], path: Path) -> Path:
             axes.semilogy(delay_ms, simulated, '.', color=colour)
             axes.semilogy(delay_ms, chosen, ':', color=colour)
         title = (
-            'Stability limit of the force control at 250 Hz: eigenvalues\n'
-            '(lines), simulation (dots); dotted: the gain that is chosen'
+            'Stability limit of the force control at 250 Hz: eigenvalues (lines), simulation (dots)\n'
+            'Dotted: the gain that the controller chooses'
         )
         axes.set(xlabel='delay of the loop (ms)', ylabel='gain (m/s per N)', title=title)
         axes.legend(loc='center left', bbox_to_anchor=(1.0, 0.5), title='stiffness')
@@ -492,7 +492,7 @@ def limit_chart(limit: Mapping[str, Array], path: Path) -> Path:
 
 def force_chart(rows: Mapping[str, Trials], path: Path) -> Path:
     """Draw the largest force of each trial by kind: success, or ended with a reason."""
-    with chart(path, (7.0, 4.6), 'Largest true force of each trial, 5 N wanted', points=10.5) as figure:
+    with chart(path, (8.5, 4.6), 'Largest true force of each trial, 5 N wanted') as figure:
         axes = figure.subplots()
         for place, trials in enumerate(rows.values()):
             for success, colour in ((False, COLOURS[1]), (True, COLOURS[0])):

@@ -23,13 +23,13 @@ PLAN = SlidePlan(slides=3, speed_m_s=0.05, force_n=1.0, slide_s=1.0)
 def data(tmp_path_factory):
     """Return a folder with bags 'glass' and 'leather' of simulated slides, and models trained on them."""
     folder = tmp_path_factory.mktemp('data')
+    (folder / 'old.added').mkdir()
+    (folder / 'old.added' / '1.json').touch()
     write_simulated(folder, PLAN, np.random.default_rng(0), surfaces=('glass', 'leather'))
     bags = [str(folder / 'glass'), str(folder / 'leather')]
     assert main(['train', 'default', *bags, '-o', str(folder / 'fast')]) == 0
     assert main(['train', 'vibration-and-taxels', *bags, '-o', str(folder / 'all')]) == 0
     os.mkfifo(folder / 'pipe')
-    (folder / 'old.added').mkdir()
-    (folder / 'old.added' / '1.json').touch()
     return folder
 
 

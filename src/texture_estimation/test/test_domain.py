@@ -31,7 +31,7 @@ def test_slides_like_those_of_the_training_are_within_the_domain():
         (conditions(force_n=3.0), 'force 3 N, trained 0.9 to 1.1 N'),
         (conditions(motion='circular'), "motion 'circular', trained 'linear_slide'"),
         (conditions(sensor='biotac'), "sensor 'biotac', trained 'tsf85'"),
-        (conditions(directions_rad=(1.57,)), 'direction 90°, trained 0°'),
+        (conditions(directions_rad=(1.57,)), 'direction 1.57 rad, trained 0 rad'),
     ],
 )
 def test_each_condition_that_was_not_trained_is_named_with_what_was(came, sentence):
@@ -76,7 +76,7 @@ def test_arcs_bridge_small_gaps_also_across_the_back(directions, arcs):
 def test_to_and_fro_is_trained_if_both_directions_are():
     both = conditions(directions_rad=(0.0, 3.14))
     assert trained_on(conditions(), conditions(directions_rad=(math.pi,))).deviation(both) == ''
-    assert TRAINED.deviation(both) == 'outside the training: direction 180°, trained 0°'
+    assert TRAINED.deviation(both) == 'outside the training: direction 3.14 rad, trained 0 rad'
 
 
 def at_level(rms, channel='signal/pac', **known):

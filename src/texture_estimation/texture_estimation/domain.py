@@ -183,8 +183,7 @@ class Domain:
             yield f"sensor '{sensor}', trained {_listed(self.sensors)}"
         compared = () if conditions.motion in TURNING_MOTIONS or not self.directions_rad else conditions.directions_rad
         if untrained := [direction for direction in compared if not self._covers(direction)]:
-            arcs = dict.fromkeys(_range((math.degrees(low), math.degrees(high))) for low, high in self.directions_rad)
-            yield f'direction {math.degrees(untrained[0]):.3g}°, trained {" and ".join(arcs)}°'
+            yield f'direction {untrained[0]:.3g} rad, trained {" and ".join(map(_range, self.directions_rad))} rad'
         for channel, rms, *_ in conditions.levels:
             trained = self.levels.get(channel)
             if is_beyond(rms, trained, self.margins.level):
