@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
+# SPDX-License-Identifier: Apache-2.0
 # The set-up is tools/workspace.py; every target below calls it first, and a finished set-up is recognised in a second.
 # `make setup PYTHON=python3.12` makes the environment of that Python; later calls keep it, whatever python3 is.
 PYTHON ?= python3
@@ -52,7 +54,7 @@ test-benchmarks: setup
 	@$(CLOCKED) -n $(BENCHMARK_JOBS) -m "benchmark and realtime" || $(call ALONE,benchmark and realtime)
 
 # Those that take minutes and explain how well and how fast surfaces are recognised.
-BENCHMARKS := latency hand papers roughness-latency learning
+BENCHMARKS := latency papers learning
 
 benchmark: setup
 	@failed=; for name in $(BENCHMARKS); do .venv/bin/texture benchmark $$name || failed="$$failed $$name"; done; \

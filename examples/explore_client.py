@@ -10,33 +10,31 @@ from typing import Any
 
 import rclpy
 from rclpy.action import ActionClient
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 from texture_msgs.action import Explore
-from texture_msgs.msg import ExplorationRequest
-from texture_msgs.msg import ExplorationResult as Result
-from texture_msgs.msg import TextureEstimate as Estimate
+from texture_msgs.msg import ExplorationRequest, ExplorationResult, TextureEstimate
 
 Next = Enum(
     'Next',
     'USE_LABEL CORRECT_REQUEST ASK_LATER EXPLORE_AGAIN CALL_A_PERSON '
     'TRAIN_IT SLIDE_ELSEWHERE SLIDE_AS_TRAINED SLIDE_LONGER LOAD_A_MODEL TRAIN_MORE',
 )
+R, E = ExplorationResult, TextureEstimate
 REFUSED = {
-    **dict.fromkeys((Result.ERROR_UNKNOWN_MOTION, Result.ERROR_INVALID_REQUEST), Next.CORRECT_REQUEST),
-    **dict.fromkeys((Result.ERROR_UNUSED_FIELD, Result.ERROR_OUTSIDE_WORKSPACE), Next.CORRECT_REQUEST),
-    **dict.fromkeys((Result.ERROR_BUSY, Result.ERROR_NOT_ACTIVE, Result.ERROR_ARM_NOT_READY), Next.ASK_LATER),
-    Result.ERROR_INTERNAL: Next.CALL_A_PERSON,
+    **dict.fromkeys((R.ERROR_UNKNOWN_MOTION, R.ERROR_INVALID_REQUEST), Next.CORRECT_REQUEST),
+    **dict.fromkeys((R.ERROR_UNUSED_FIELD, R.ERROR_OUTSIDE_WORKSPACE), Next.CORRECT_REQUEST),
+    **dict.fromkeys((R.ERROR_BUSY, R.ERROR_NOT_ACTIVE, R.ERROR_ARM_NOT_READY), Next.ASK_LATER),
+    R.ERROR_INTERNAL: Next.CALL_A_PERSON,
 }
 REJECTED = {
-    Estimate.REJECTION_NONE: Next.USE_LABEL,
-    Estimate.REJECTION_NOVEL: Next.TRAIN_IT,
-    Estimate.REJECTION_AMBIGUOUS: Next.SLIDE_ELSEWHERE,
-    Estimate.REJECTION_OUTSIDE_TRAINING: Next.SLIDE_AS_TRAINED,
-    Estimate.REJECTION_TOO_LITTLE_EVIDENCE: Next.SLIDE_LONGER,
-    Estimate.REJECTION_NO_MODEL: Next.LOAD_A_MODEL,
-    Estimate.REJECTION_TOO_LITTLE_TRAINING: Next.TRAIN_MORE,
+    E.REJECTION_NONE: Next.USE_LABEL,
+    E.REJECTION_NOVEL: Next.TRAIN_IT,
+    E.REJECTION_AMBIGUOUS: Next.SLIDE_ELSEWHERE,
+    E.REJECTION_OUTSIDE_TRAINING: Next.SLIDE_AS_TRAINED,
+    E.REJECTION_TOO_LITTLE_EVIDENCE: Next.SLIDE_LONGER,
+    E.REJECTION_NO_MODEL: Next.LOAD_A_MODEL,
+    E.REJECTION_TOO_LITTLE_TRAINING: Next.TRAIN_MORE,
 }
 
 
@@ -45,28 +43,22 @@ class TextureClient(Node):
 
     def __init__(self) -> None:
         super().__init__('texture_client')
-        self._spinner = SingleThreadedExecutor()
-        self._spinner.add_node(self)
         self._explore = ActionClient(self, Explore, 'explore')
         self._stop = self.create_client(Trigger, 'explorer/stop')
-        self.feedback: Any = None
-
-    def _on_feedback(self, message: Any) -> None:
-        self.feedback = message.feedback
 
     def start(self, **request: Any) -> None:
         """Request an exploration; omitted values take the default of the motion."""
-        self.feedback = None
+        self.feedback: Any = None
         self._explore.wait_for_server()
         goal = Explore.Goal(request=ExplorationRequest(**request))
-        sent = self._explore.send_goal_async(goal, self._on_feedback)
-        self._spinner.spin_until_future_complete(sent)
+        sent = self._explore.send_goal_async(goal, lambda message: setattr(self, 'feedback', message.feedback))
+        rclpy.spin_until_future_complete(self, sent)
         self._goal = sent.result()
         self._ending = self._goal.get_result_async()
 
     def is_complete(self) -> bool:
         """Let messages arrive, and return whether the result has."""
-        self._spinner.spin_once(timeout_sec=0.05)
+        rclpy.spin_once(self, timeout_sec=0.05)
         return self._ending.done()
 
     def cancel(self) -> None:
@@ -78,21 +70,21 @@ class TextureClient(Node):
         self._stop.wait_for_service()
         self._stop.call_async(Trigger.Request())
 
-    def result(self) -> Result:
+    def result(self) -> ExplorationResult:
         """Return the result of the exploration."""
         return self._ending.result().result.result
 
 
-def probabilities(result: Result) -> dict[str, float]:
+def probabilities(result: ExplorationResult) -> dict[str, float]:
     """Return the probability of each texture by its name; empty without a model or evidence."""
     return dict(zip(result.labels, result.texture.probabilities, strict=True))
 
 
-def next_step(result: Result) -> Next:
+def next_step(result: ExplorationResult) -> Next:
     """Return what to do after a result: the error code first, then the rejection of the label."""
     if result.error_code in REFUSED:
         return REFUSED[result.error_code]
-    if result.error_code != Result.ERROR_NONE:
+    if result.error_code != R.ERROR_NONE:
         return Next.EXPLORE_AGAIN if result.lifted else Next.CALL_A_PERSON
     return REJECTED[result.texture.rejection]
 

@@ -9,8 +9,8 @@ import pytest
 from texture_benchmarks.catalogue import BENCHMARKS
 from texture_benchmarks.generalisation import generalisation_chart
 from texture_benchmarks.overview import computing_chart, sliding_chart
-from texture_benchmarks.scale import scale_chart
 from texture_benchmarks.scenes import ablation_chart
+from texture_benchmarks.trust import failures_chart
 from texture_bringup.command import main
 
 pytestmark = pytest.mark.ros
@@ -26,19 +26,17 @@ def test_every_benchmark_has_its_line_on_the_page_and_make_runs_some() -> None:
 
 
 @pytest.mark.parametrize(
-    ('name', 'draw', 'keys'),
+    ('name', 'draw'),
     [
-        ('generalisation', generalisation_chart, ()),
-        ('overview', sliding_chart, ()),
-        ('overview', computing_chart, ()),
-        ('scale', scale_chart, ('textures, default',)),
-        ('scenes', ablation_chart, ()),
+        ('generalisation', generalisation_chart),
+        ('overview', sliding_chart),
+        ('overview', computing_chart),
+        ('scenes', ablation_chart),
+        ('trust', failures_chart),
     ],
 )
-def test_the_charts_of_the_pages_can_be_drawn_from_the_stored_figures(name, draw, keys, tmp_path: Path) -> None:
+def test_the_charts_of_the_pages_can_be_drawn_from_the_stored_figures(name, draw, tmp_path: Path) -> None:
     numbers = json.loads((PAGES / 'charts' / f'{name}.json').read_text(encoding='utf-8'))['numbers']
-    for key in keys:
-        numbers = numbers[key]
     assert draw(numbers, tmp_path / 'chart.png').is_file()
 
 
@@ -57,7 +55,6 @@ def test_a_mistake_is_answered_with_one_sentence_and_exit_code_2(arguments, sent
 @pytest.mark.parametrize(
     ('arguments', 'sentence'),
     [
-        ('benchmark latency --only biotac20', "--only is 'biotac20'; `generalisation` alone"),
         ('benchmark latency --out /proc/x', "'/proc/x' cannot be used"),
         ('endurance --duration 0', '--duration is 0; it must be above 0'),
     ],

@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +22,7 @@ from texture_benchmarks.generalisation import (
 )
 from texture_benchmarks.peers import SVC, recipe_of
 from texture_benchmarks.study import BenchmarkOptions
-from texture_core.errors import InvalidData, UnknownName
+from texture_core.errors import InvalidData
 from texture_recordings.dataset import SlideDataset
 
 RATE_HZ = 100.0
@@ -97,17 +96,17 @@ def test_what_is_trained_from_either_end_lies_in_no_test_of_another_stretch() ->
     assert places == {'6-10/10'} == {name.rpartition(' part ')[2] for name in turned.trained}
 
 
-def test_what_is_finished_is_not_computed_again_and_what_is_not_is_named(tmp_path: Path) -> None:
-    options = BenchmarkOptions(tmp_path, only='simulated track', budget_s=0.01)
+def test_what_is_finished_is_not_computed_again_and_what_fails_is_named(tmp_path: Path, monkeypatch) -> None:
+    def fails(*_: object) -> None:
+        raise InvalidData('too few slides')
+
+    monkeypatch.setattr(generalisation, '_run_part', fails)
+    options = BenchmarkOptions(tmp_path, quick=True)
     row, cell = 'simulated, no gap', figures([ended('cork', 'cork', accepted=True, cluster='a')])
     line = {'part': f'simulated track, {SVC}', 'found': [[HALVES, row, SVC, cell]]}
     (tmp_path / generalisation.FINISHED).write_text(json.dumps(line) + '\n')
     numbers = generalisation.run(options).numbers
-    assert numbers['missing'][:3] == [
-        'simulated track, default',
-        'cells (not chosen)',
-        'same half, no gap (not chosen)',
-    ]
+    assert numbers['missing'] == ['simulated track, default']
     assert numbers[HALVES] == {row: {SVC: json.loads(json.dumps(cell))}}
 
 
@@ -121,11 +120,10 @@ def test_without_some_sets_the_others_are_measured_and_these_are_named(tmp_path:
     numbers = generalisation.run(options).numbers
     assert numbers['missing'] == ['a part (no recordings)']
     assert numbers[HALVES]['a row']['direction alone']['accuracy'] == 1.0
-    assert f"'{tmp_path}' has no gone, left out; `--only SET` measures one of here alone" in capsys.readouterr().out
-    with pytest.raises(InvalidData, match='give the folder that holds gone/ with --data'):
-        generalisation.run(replace(options, only='gone'))
-    with pytest.raises(UnknownName, match="did you mean 'here'"):
-        generalisation.run(replace(options, only='hare'))
+    assert f"'{tmp_path}' has no gone, left out" in capsys.readouterr().out
+    (tmp_path / 'here').rmdir()
+    with pytest.raises(InvalidData, match='give the folder that holds here/ with --data'):
+        generalisation.run(options)
 
 
 def test_names_are_of_the_requested_places() -> None:

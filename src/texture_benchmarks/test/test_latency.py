@@ -30,14 +30,3 @@ def test_every_window_is_answered_through_the_graph(tmp_path: Path) -> None:
         assert dds['estimates'] == dds['expected']
         assert 0 < dds['median_ms'] <= dds['p99_ms'] <= dds['longest_ms']
         assert result.numbers[recipe]['cpu_percent']['all'] > 0
-
-
-@pytest.mark.benchmark
-@pytest.mark.ros
-def test_every_finger_of_a_hand_is_answered_through_the_graph(tmp_path: Path) -> None:
-    result, _ = run_benchmark('hand', BenchmarkOptions(tmp_path, quick=True))
-    row = result.numbers['default']
-    # Two fingers slide for 3 s: windows of 0.5 s every 0.1 s make 26 each.
-    assert row['estimates'] == row['expected'] == 52
-    assert 0 < row['median_ms'] <= row['p99_ms'] <= row['longest_ms']
-    assert row['cpu_percent']['all'] > 0

@@ -12,15 +12,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_benchmarks.ros.graph import Graph
-from texture_core.ros import to_msg
-from texture_core.ros_testing import NodeProcess
+from texture_core.ros import from_msg, to_msg
+from texture_core.ros_testing import LocalGraph, NodeProcess
 from texture_core.types import ExplorationState, Phase, TextureEstimate
 from texture_estimation.model import TextureModel, load_model
 from texture_evaluation.evaluate import run_model
 from texture_evaluation.train import train_from_bags
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.public_sets import import_biotac20
+from texture_recordings.ros import TOPICS
 from texture_recordings.slides import find_slides
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
@@ -40,44 +40,48 @@ def live(model: Path, bags: Path, slides: str, rate: float, domain_id: int) -> t
     health: dict[str, str] = {}
     wanted = {slide.exploration_id for slide in find_slides([bags], slides)}
 
-    def on_estimate(estimate: TextureEstimate) -> None:
+    def on_estimate(message: object) -> None:
+        estimate = from_msg(message)
         received[estimate.exploration_id].append(estimate)
 
     def node(package: str, name: str, **parameters: object) -> NodeProcess:
         return NodeProcess(package, name, parameters, domain_id=domain_id)
 
     with (
-        Graph(domain_id) as graph,
+        LocalGraph(domain_id, 120.0) as graph,
         node('texture_features', 'feature_extractor', recipe=str(model.with_suffix('.json'))),
         node('texture_estimation', 'classifier', model=str(model)),
     ):
-        graph.listen('texture', on_estimate)
-        graph.listen('diagnostics', reader_of(health))
+        for topic, read in (('texture', on_estimate), ('diagnostics', reader_of(health))):
+            kind, qos, name = TOPICS[topic]
+            graph.peer.create_subscription(kind, name, read, qos)
         call_through(graph, received)
         with node(
             'texture_recordings', 'replay', bag=str(bags), slides=slides, rate=rate, start_delay_s=2.0, deadline_s=60.0
         ) as replay:
-            graph.wait_until(lambda: wanted <= ended(received), 120.0, 'the final estimates')
+            graph.until(lambda: wanted <= ended(received))
             assert replay.wait(60.0) == 0, replay.output
         counted = health.copy()
-        graph.wait_until(lambda: health != counted, 30.0, 'a diagnosis after the last window')
+        graph.until(lambda: health != counted)  # a diagnosis after the last window
     return {name: estimates for name, estimates in received.items() if name in wanted}, health
 
 
-def call_through(graph: Graph, received: Estimates) -> None:
+def call_through(graph: LocalGraph, received: Estimates) -> None:
     """Wait until an empty slide is answered: only then has every node found the next one."""
-    states = graph.publisher('exploration')
+    kind, qos, name = TOPICS['exploration']
+    states = graph.peer.create_publisher(kind, name, qos)
     calls = count()
 
     def answered() -> bool:
-        name = f'call {next(calls)}'
+        call = f'call {next(calls)}'
         for phase in (Phase.SLIDE, Phase.DONE):
-            states.publish(to_msg(ExplorationState(time.time_ns(), name, '', phase)))
+            states.publish(to_msg(ExplorationState(time.time_ns(), call, '', phase)))
         return bool(received)
 
-    graph.wait_until(answered, 60.0, 'the answer to an empty slide')
-    graph.node.destroy_publisher(states)  # while it exists nothing can be replayed
-    graph.spin(0.5)
+    graph.until(answered)
+    graph.peer.destroy_publisher(states)  # while it exists nothing can be replayed
+    settled_s = time.monotonic() + 0.5
+    graph.until(lambda: time.monotonic() > settled_s)
     received.clear()
 
 

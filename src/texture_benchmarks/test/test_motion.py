@@ -48,7 +48,6 @@ def test_a_force_100_ms_late_by_stamps_of_arrival_is_named_and_no_success():
 def test_the_sweep_keeps_its_goals(tmp_path: Path) -> None:
     result, path = run_benchmark('motion', BenchmarkOptions(tmp_path, quick=True))
     assert path.is_file()
-    assert all(chart.is_file() for chart in result.charts)
     for name, figures in result.numbers['rows'].items():
         assert figures['internal'] == 0, name
         assert figures['overshoot_of_success'] <= 0.2, name

@@ -8,18 +8,7 @@ import numpy as np
 import pytest
 
 from texture_benchmarks.study import BenchmarkOptions
-from texture_benchmarks.trust import (
-    ROWS,
-    UNDISTURBED,
-    VIBRATION,
-    breakdown,
-    breakdown_strengths,
-    breakdowns,
-    disturbed,
-    ordered,
-    outcome,
-    run,
-)
+from texture_benchmarks.trust import ROWS, UNDISTURBED, VIBRATION, disturbed, outcome, run, trained_ranges
 from texture_core.types import ExplorationState, Phase, Rejection, TactileSignal, TextureEstimate
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.metrics import SlideResult
@@ -55,30 +44,11 @@ def test_wear_halves_the_power_at_its_cut_off_and_half_the_speed_the_frequency()
     np.testing.assert_allclose(slower[100:-100], np.sin(2 * np.pi * 50.0 * time_s)[100:-100], atol=0.01)
 
 
-@pytest.mark.parametrize(
-    ('fractions', 'expected'),
-    [((1.0, 0.95, 0.85), 1.5), ((0.5, 0.4), 0.5), ((1.0, 0.9), None), ((0.0, 0.0), None)],
-)
-def test_a_curve_breaks_down_where_it_crosses_nine_tenths_of_its_start(fractions, expected) -> None:
-    assert breakdown(range(len(fractions)), fractions) == (expected and pytest.approx(expected))
-
-
-def test_factors_break_down_on_both_sides_of_one() -> None:
-    ends = {name: {'slides': 10, 'label_right': 10} for _, name in ordered(ROWS['gain'])}
-    worst = {'slides': 10, 'label_right': 0}
-    lowest, *_, highest = (name for _, name in ordered(ROWS['gain']))
-    found = breakdowns(ROWS['gain'], {**ends, lowest: worst, highest: worst})
-    assert found == pytest.approx([0.9, 7.1])
-    assert breakdown_strengths(ROWS['gain'], {**ends, lowest: worst, highest: worst}) == pytest.approx([0.68, 1.46])
-
-
 def test_what_the_training_covers_is_read_from_the_recipe() -> None:
-    augmentation = load_recipe('default').augmentation
-    covered = {name: row.trained(augmentation) for name, row in ROWS.items()}
+    covered = trained_ranges(load_recipe('default').augmentation)
     assert covered['gain'] == pytest.approx((1 / 1.6, 1.6))
     assert covered['white noise'] == (0.0, 0.05)
     assert covered['speed'] == pytest.approx((0.85, 1.15))
-    assert {name for name, inside in covered.items() if inside} == {'gain', 'white noise', 'speed'}
 
 
 def batches(samples: np.ndarray, rate_hz: float, batch: int) -> LabelledSlide:

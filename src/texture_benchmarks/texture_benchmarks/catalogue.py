@@ -8,32 +8,20 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from texture_benchmarks import (
-    generalisation,
-    latency,
-    learning,
-    motion,
-    overview,
-    papers,
-    scale,
-    scenes,
-    trust,
-)
+from texture_benchmarks import generalisation, latency, learning, motion, overview, papers, scale, scenes, trust
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult
 from texture_core.config import find
 
 BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
     'latency': latency.run,  # from window to estimate, in one process and through the graph; computing time
-    'hand': latency.run_hand,  # five BioTacs at once through the running nodes: latency and computing time
     # accuracy over sliding time and over computing time: ours, the papers' and peers, in one run
     'overview': overview.run,
     'scale': scale.run,  # trainings and windows with up to 1000 textures and 100 000 windows, drawn features
     'generalisation': generalisation.run,  # against the distance from what was trained: place, day, finger, run
     'papers': papers.run,  # the papers' recipes on recordings, at the same and at another place of a track
     'trust': trust.run,  # where recognition fails: how slides end under disturbances and over unknown materials
-    'roughness-latency': latency.run_roughness,  # from window to grade
     'learning': learning.run,  # textures added slide by slide, and slides needed with chosen motions
-    'motion': motion.run,  # force, speed and circle by robot and surface; where force control is stable
+    'motion': motion.run,  # forces in virtual time by stiffness, delay and fault
     'scenes': scenes.run,  # cost of simulated slides and devices; what each term of a scene contributes
 }
 

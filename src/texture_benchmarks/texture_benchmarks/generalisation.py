@@ -30,7 +30,6 @@ from texture_benchmarks.study import (
     resumed,
     with_spaced_windows,
 )
-from texture_core.config import find
 from texture_core.types import NANOSECONDS, Phase, join_batches
 from texture_estimation.recipe import FAST_TOPIC, Recipe
 from texture_estimation.training import train
@@ -51,10 +50,9 @@ DISTANCE, SPACING, HALVES, OTHER = 'distance', 'spacing', 'halves', 'other'
 PLACE_RECIPES = ('any-place-and-taxels', 'any-place', 'vibration-and-taxels', 'default')
 CELLS, CELL_CM = 8, 1.4
 SPACED = {'1, 7': (1, 7), '2, 6': (2, 6), '3, 5': (3, 5), '1, 3, 5, 7': (1, 3, 5, 7)}
-BETWEEN, THERE = 'between', 'at trained places'
 # Slides trained and tested: three draws, each trained before it is tested.
 DRAWS = {'1-20 → 21-30': ('1-20', '21-30'), '11-30 → 31-40': ('11-30', '31-40'), '1-20 → 31-40': ('1-20', '31-40')}
-FIRST_DRAW = next(iter(DRAWS))
+LATER_DRAWS = tuple(DRAWS)[1:]
 # Parts of ten of the track that are trained, and those that are tested then; also from the other end.
 PARTS = 10
 Span = tuple[int, int]
@@ -65,7 +63,6 @@ GAPS: Sequence[tuple[Span, Mapping[str, Span]]] = (
     ((0, 3), {'gap of 4.4 cm': (7, 10)}),
     ((2, 5), {'control of 4.4 cm': (5, 8)}),
 )
-QUARTER = 'three quarters, the fourth tested'
 # Controls that see no signal: whether the textures differ in how the robot slid over them.
 CONTROLS: Mapping[str, Callable[[LabelledSlide], tuple[float, ...]]] = {
     'force and speed alone': lambda one: (one.force_n, one.speed_m_s),
@@ -78,7 +75,7 @@ SPIDER_HZ, SPIDER_TRAINED = 15.6, '2024-02-13'
 SPIDER = {'2024-02-13b': 'same day', '2024-02-20am1': 'other day', '2024-02-20am2': 'other day',
           '2024-02-21_sensor2': 'other specimen'}  # fmt: skip
 BOREAL_HZ, BOREAL_S, BOREAL_SLIDES, BOREAL_TRAINED = 100.0, 5.0, 12, 0.6  # slides of a run at most, and trained runs
-# For every draw; networks take ten times as long.
+# Trained for the later draws, too; networks take ten times as long.
 QUICK_RECIPES = ('any-place-and-taxels', 'any-place', SVC, 'force and speed alone', 'direction alone')
 LONG_NS = 2_000_000_000  # slides from here on have enough windows 0.5 s apart
 PEER_WINDOWS = WindowParams(length_s=0.5, hop_s=0.25)
@@ -90,7 +87,6 @@ class Trial(NamedTuple):
     draw: str
     trained: Sequence[str]
     tested: Mapping[tuple[str, str], Sequence[str]]  # by table and row
-    all_recipes: bool = True  # or those alone that train within seconds
 
 
 Trials = tuple[SlideDataset, Sequence[Trial]]  # slides whose features are computed once, and the trials among them
@@ -121,9 +117,14 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     as accepted. 95 % intervals by bootstrap over surface × part, date or run: slides over one track are no independent
     draws.
     """
-    only = options.only or (QUICK_SET if options.quick else '')
-    chosen = {only: find(SETS, only, 'data set')} if only else SETS
-    slides = _read(chosen, options)
+    chosen = {QUICK_SET: SETS[QUICK_SET]} if options.quick else SETS
+    public = [name for name in chosen if not name.startswith('simulated')]
+    absent = [name for name in public if not options.has(name)]
+    if public and absent == public:
+        options.recordings(public[0])  # which is refused
+    if absent:
+        print(f"generalisation: '{options.data}' has no {', '.join(absent)}, left out", flush=True)
+    slides = {name: source.read(options) for name, source in chosen.items() if name not in absent}
     parts = {
         f'{part}, {recipe}': (name, part, recipe)
         for name in slides
@@ -133,13 +134,12 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     }
     order = sorted(parts, key=lambda name: (parts[name][2] == peers.CNN, parts[name][2] not in SLOW))
     work = partial(_run_part, slides, options.seed)
-    found = resumed(work, {name: parts[name] for name in order}, options.out / FINISHED, options)
+    found = resumed(work, {name: parts[name] for name in order}, options.out / FINISHED)
     numbers: dict[str, Any] = {table: {} for table in (DISTANCE, SPACING, HALVES, OTHER)}
     for table, row, recipe, cell in (one for name in parts if name in found for one in found[name]):
         numbers[table].setdefault(row, {})[recipe] = cell
-    absent = {name: 'no recordings' if name in chosen else 'not chosen' for name in SETS if name not in slides}
     numbers['missing'] = [name for name in parts if name not in found]
-    numbers['missing'] += [f'{part} ({why})' for name, why in absent.items() for part in SETS[name].parts]
+    numbers['missing'] += [f'{part} (no recordings)' for name in absent for part in SETS[name].parts]
     whole = all(numbers[table] for table in (DISTANCE, SPACING, OTHER))
     return BenchmarkResult(
         data=DATA_SETS,
@@ -147,18 +147,6 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         numbers=numbers,
         charts=(generalisation_chart(numbers, options.out / 'generalisation.png'),) if whole else (),
     )
-
-
-def _read(chosen: Mapping[str, Source], options: BenchmarkOptions) -> dict[str, SlideDataset]:
-    """Return the sets that are there, by name; where no recorded one is, refuse with what the first lacks."""
-    absent = [name for name in chosen if not name.startswith('simulated') and not options.has(name)]
-    there = [name for name in chosen if name not in absent]
-    if absent and all(name.startswith('simulated') for name in there):
-        options.recordings(absent[0])
-    if absent:
-        left_out = f"'{options.data}' has no {', '.join(absent)}, left out"
-        print(f'generalisation: {left_out}; `--only SET` measures one of {", ".join(there)} alone', flush=True)
-    return {name: chosen[name].read(options) for name in there}
 
 
 def _run_part(slides: Mapping[str, SlideDataset], seed: int, part: tuple[str, str, str]) -> list[Figures]:
@@ -205,7 +193,7 @@ def answers_of(
         recipe = with_spaced_windows(recipe_named(name)) if name == SVC and long else recipe_named(name)
         fit = _recipe(dataset, recipe, accepts_all=name == SVC)
     found = []
-    chosen = [one for one in all_trials if one.all_recipes or name in QUICK_RECIPES]
+    chosen = [one for one in all_trials if one.draw not in LATER_DRAWS or name in QUICK_RECIPES]
     for number, trial in enumerate(chosen, 1):
         began_s = time.monotonic()
         test = fit(trial.trained)
@@ -278,20 +266,19 @@ def _cells(whole: SlideDataset) -> Trials:
     slides, trials = whole.in_parts(CELLS), []
     places = [f'{number + 1}/{CELLS}' for number in range(CELLS)]
     for draw, (trained, tested) in DRAWS.items():
-        every = draw == FIRST_DRAW
         at = [names_of(slides, tested, place) for place in places]
         for cell, place in enumerate(places):
             rows: defaultdict[tuple[str, str], list[str]] = defaultdict(list)
             for other, names in enumerate(at):
                 rows[DISTANCE, str(abs(cell - other))] += names
-            trials.append(Trial(draw, names_of(slides, trained, place), rows, every))
+            trials.append(Trial(draw, names_of(slides, trained, place), rows))
         for name, chosen in SPACED.items():
             between = [other for other in range(min(chosen) + 1, max(chosen)) if other not in chosen]
             spaced = {
-                (SPACING, f'{name}: {BETWEEN}'): [one for other in between for one in at[other]],
-                (SPACING, f'{name}: {THERE}'): [one for other in chosen for one in at[other]],
+                (SPACING, f'{name}: between'): [one for other in between for one in at[other]],
+                (SPACING, f'{name}: at trained places'): [one for other in chosen for one in at[other]],
             }
-            trials.append(Trial(draw, names_of(slides, trained, *(places[cell] for cell in chosen)), spaced, every))
+            trials.append(Trial(draw, names_of(slides, trained, *(places[cell] for cell in chosen)), spaced))
     return slides, trials
 
 
@@ -310,7 +297,7 @@ def _stretches(spans: Mapping[str, Span], trained: Span, slides: SlideDataset) -
             tested = {
                 (HALVES, row): names_of(both, after, _place(_turned(span, mirrored))) for row, span in spans.items()
             }
-            trials.append(Trial(draw, there, tested, draw == FIRST_DRAW))
+            trials.append(Trial(draw, there, tested))
     return both, trials
 
 
@@ -321,8 +308,7 @@ def _quarters(slides: SlideDataset) -> Trials:
         Trial(
             draw,
             names_of(parts, before, *(other for other in places if other != place)),
-            {(HALVES, QUARTER): names_of(parts, after, place)},
-            draw == FIRST_DRAW,
+            {(HALVES, 'three quarters, the fourth tested'): names_of(parts, after, place)},
         )
         for draw, (before, after) in DRAWS.items()
         for place in places
@@ -440,14 +426,14 @@ def _read_fingersense(options: BenchmarkOptions) -> SlideDataset:
     return _middles(slides.select(labels=FABRICS, where=lambda one: one.session >= DATES[0]))
 
 
-def _dates(slides: SlideDataset) -> Trials:
-    """Return each date left out in turn."""
+def _leave_out(row: str, condition: str, slides: SlideDataset) -> Trials:
+    """Return each value of a condition left out in turn; tested are surfaces that the others have, too."""
+    names, labels, values = slides.names, slides.labels, slides.condition(condition)
     trials = []
-    for date in DATES:
-        trained = [one for one in slides if one.session != date]
-        surfaces = {one.surface for one in trained}
-        left = [one.name for one in slides if one.session == date and one.surface in surfaces]
-        trials.append(Trial('', [one.name for one in trained], {(OTHER, 'fingersense, another date'): left}))
+    for value in np.unique(values):
+        others = values != value
+        tested = ~others & np.isin(labels, labels[others])
+        trials.append(Trial('', names[others].tolist(), {(OTHER, row): names[tested].tolist()}))
     return slides, trials
 
 
@@ -531,16 +517,6 @@ def _strokes(slides: SlideDataset) -> Trials:
     return slides, [Trial('', names_of(slides, '1-4'), tested)]
 
 
-def _speeds(slides: SlideDataset) -> Trials:
-    """Return each speed left out in turn."""
-    names, speeds = slides.names, slides.condition('speed')
-    trials = [
-        Trial('', names[speeds != speed].tolist(), {(OTHER, 'ntp21, another speed'): names[speeds == speed].tolist()})
-        for speed in np.unique(speeds)
-    ]
-    return slides, trials
-
-
 def _other_half(slides: SlideDataset) -> Trials:
     """Return one half of the path trained, with one of four forces out; half a faster slide is shorter than windows."""
     halves = slides.select(where=lambda one: one.speed_m_s < 0.05).in_parts(2)
@@ -577,13 +553,18 @@ SETS: Mapping[str, Source] = {
             'quarters': ((*PLACE_RECIPES, SVC), _quarters),
         },
     ),
-    'fingersense': Source(_read_fingersense, {'dates': (TAXELS, _dates)}),
+    'fingersense': Source(
+        _read_fingersense, {'dates': (TAXELS, partial(_leave_out, 'fingersense, another date', 'session'))}
+    ),
     'spider_sandpaper': Source(_read_spider, {'sessions': (TAXELS, _sessions)}),
     'borealtc': Source(_read_borealtc, {'runs': (PLAIN, _runs)}),
     'lmt29': Source(partial(recorded, name='lmt29'), {'strokes': (PLAIN, _strokes)}),
     'ntp21': Source(
         partial(recorded, name='ntp21'),
-        {'speeds': (('any-speed', SVC), _speeds), 'other half': (('any-speed', SVC), _other_half)},
+        {
+            'speeds': (('any-speed', SVC), partial(_leave_out, 'ntp21, another speed', 'speed')),
+            'other half': (('any-speed', SVC), _other_half),
+        },
     ),
     'simulated places': Source(_read_places, {'simulated places': (PLAIN, _places)}),
     QUICK_SET: Source(_read_track, {QUICK_SET: (PLAIN, _track)}),

@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, recorded
-from texture_core.config import find
 from texture_core.types import Array, SlideMotion, Window
 from texture_estimation.incremental import IncrementalClassifier
 from texture_estimation.learners.mlp import Mlp
@@ -25,7 +24,6 @@ from texture_estimation.model import TextureModel
 from texture_estimation.next_motion import NextTouchModel
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.training import train
-from texture_evaluation.charts import COLOURS, chart
 from texture_evaluation.cross_validation import predict_slides
 from texture_evaluation.metrics import window_accuracy
 from texture_evaluation.train import training_examples
@@ -72,15 +70,16 @@ def run_incremental(
             add_s.append(time.process_time() - began_s)
         retrained = train(recipe, examples.take(training & (~is_new | (numbers <= stage))))
         scores[stage] = {
-            'incremental': _score(incremental.model, examples.take(test)),
-            'retrained': _score(retrained, examples.take(test)),
-            NEW_ONES: _score(incremental.model, examples.take(test & is_new)),
-            OLD: _score(incremental.model, examples.take(test & ~is_new)),
+            'incremental': score(incremental.model, examples.take(test)),
+            'retrained': score(retrained, examples.take(test)),
+            NEW_ONES: score(incremental.model, examples.take(test & is_new)),
+            OLD: score(incremental.model, examples.take(test & ~is_new)),
         }
-    return scores, _score(base, examples.take(test & ~is_new)), add_s
+    return scores, score(base, examples.take(test & ~is_new)), add_s
 
 
-def _score(model: TextureModel, examples: LabelledFeatures) -> dict[str, float]:
+def score(model: TextureModel, examples: LabelledFeatures) -> dict[str, float]:
+    """Return the accuracy of the windows and of the whole slides."""
     results = list(predict_slides(model, examples).values())
     slides = float(np.mean([one.end.label == one.surface for one in results]))
     return {'windows': window_accuracy(results), 'slides': slides}
@@ -143,7 +142,7 @@ def known_from(motions: Sequence[SlideMotion], values: Array, textures: Sequence
 def simulated_slides(motions: Sequence[SlideMotion], count: int, rng: np.random.Generator) -> Array:
     """Return the features of slides of one window each, (n_motions, n_textures, count, n_features)."""
     scene = load_scene(SCENE)
-    stream = find(SENSORS, scene.sensor, 'sensor model').fast
+    stream = SENSORS[scene.sensor].fast
     cells = []
     for motion, surface in itertools.product(motions, sorted(scene.surfaces)):
         speed, force = motion.speed_m_s, motion.force_n
@@ -250,7 +249,6 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         split=f'{count} draws of {size} new materials: trained on slides 1-{last_training} of the others, trained '
         f'slide by slide from slide 1 on, tested on the slides after {last_training} of all',
         numbers={**_numbers(runs, draws, stages), 'chosen_motions': chosen},
-        charts=(_chart(runs, stages, size, options.out / 'learning.png'),),
     )
 
 
@@ -271,26 +269,5 @@ def _numbers(runs: Sequence[tuple[Any, ...]], draws: Sequence[Any], stages: Sequ
         'add_ms': {
             'added_slides': len(add_ms),
             'median': round(float(np.median(add_ms)), 1),
-            '95 %': round(float(np.percentile(add_ms, 95)), 1),
-            'longest': round(float(add_ms.max()), 1),
         },
     }
-
-
-def _chart(runs: Sequence[tuple[Any, ...]], stages: Sequence[int], new: int, path: Path) -> Path:
-    """Draw slides and windows right over the number of slides of each new texture, mean and range over the draws."""
-    lines = (('incremental', 'added one slide at a time', COLOURS[0]), ('retrained', 'trained again', COLOURS[1]))
-    title = f'{new} new materials added to the others (BioTac, later slides of all)'
-    with chart(path, (8.0, 4.8), title, points=11.0) as figure:
-        axes = figure.subplots()
-        for what, dashes in (('slides', '-'), ('windows', '--')):
-            for which, how, colour in lines:
-                right = 100 * np.array([[scores[stage][which][what] for scores, *_ in runs] for stage in stages])
-                axes.plot(stages, right.mean(axis=1), dashes, marker='o', color=colour, label=f'{how}: {what}')
-                axes.fill_between(stages, right.min(axis=1), right.max(axis=1), color=colour, alpha=0.15, linewidth=0)
-        axes.set(xscale='log', xlabel='slides of each new material', ylabel='right (%), range of draws')
-        axes.set_ylim(None, 101)
-        axes.set_xticks(stages, [f'{stage}' for stage in stages])
-        axes.minorticks_off()
-        figure.legend(loc='outside lower center', ncols=2)  # the lines leave no corner free
-    return path

@@ -8,7 +8,7 @@ import itertools
 import time
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,14 +24,7 @@ from texture_core.types import Array, Samples
 from texture_evaluation.charts import COLOURS, chart
 from texture_papers import jamali_experiment, roberge_experiment
 from texture_papers.protocol import PaperProtocol, folds, halves, of_task
-from texture_simulation.effects import (
-    EFFECTS,
-    FingerSpread,
-    ForceGain,
-    PatchGrowth,
-    SlideError,
-    Unevenness,
-)
+from texture_simulation.effects import FingerSpread, ForceGain, PatchGrowth, SlideError, Unevenness
 from texture_simulation.offline import simulate_slide_streams
 from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import Contact, Scene, load_scene
@@ -96,9 +89,6 @@ REMOVED_EFFECTS: Mapping[str, Mapping[str, Any]] = {
     },
     'sticky': {'patch_growth': PatchGrowth(), 'unevenness': Unevenness(0.1)},
 }
-# Effects that no scene names: each alone is added to `HOST`, with the default strength, to be measured.
-HOST = 'twelve_textures'
-ADDED = ('skids',)
 
 
 def completed(scene: Scene, touch_protocol: TouchProtocol) -> Scene:
@@ -245,12 +235,11 @@ SLIDE = SimulatedSlide(0.1, 2.0, SCAN_S)
 def scan_cost(scene: Scene, surfaces: Sequence[str], repeats: int, many: int) -> dict[str, float]:
     """Return the ms of computing for a slide of 0.5 s with all channels; `repeats` is that of single slides.
 
-    Medians over surfaces, of one slide at a time and of each of many at once; and the dearest surface, together.
+    Medians over surfaces, of one slide at a time and of each of many at once.
     """
     alone = [_scan_ms(scene, name, 1, repeats) for name in surfaces]
     together = [_scan_ms(scene, name, many, max(1, repeats // 5)) for name in surfaces]
-    medians = {'alone_ms': float(np.median(alone)), 'together_ms': float(np.median(together))}
-    return {**medians, 'worst_ms': max(together)}
+    return {'alone_ms': float(np.median(alone)), 'together_ms': float(np.median(together))}
 
 
 def _scan_ms(scene: Scene, surface: str, count: int, repeats: int) -> float:
@@ -301,12 +290,8 @@ COLUMNS = 2
 
 
 def ablation_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
-    """Draw for each scene how the accuracy changes when a term is left out; the last panel is of terms put in."""
-    added = {term: row[term] for term, row in numbers['added'].items()}
-    without = np.mean(
-        [row['accuracy'] + row[term]['accuracy_without']['change'] for term, row in numbers['added'].items()]
-    )
-    panels = {**numbers['terms'], f'{HOST}, with one of': {'accuracy': float(without), **added}}
+    """Draw for each scene how the accuracy changes when a term is left out."""
+    panels = numbers['terms']
     terms = {name: {t: row for t, row in figures.items() if isinstance(row, dict)} for name, figures in panels.items()}
     rows = -(-len(panels) // COLUMNS)
     size = (7.2, 1.1 + rows * (0.9 + 0.27 * max(map(len, terms.values()))))
@@ -350,12 +335,11 @@ QUICK = (('ets_linear', 'sticky'), 32, 2, 1, 2, 10)
 
 
 def run(options: BenchmarkOptions) -> BenchmarkResult:
-    """Time slides, remove each term of each scene in turn, and add what none of them names.
+    """Time slides, and remove each term of each scene in turn.
 
     Computing time (ms) of a slide of 0.5 s with all channels, alone and as one of many at once, median over surfaces;
     accuracy of a linear discriminant (shrunk covariance) on the logarithm of 24 bands of the spectrum of each channel,
-    with and without each term; the effects that no scene names are put into one scene one at a time, as strong as the
-    catalogue has them.
+    with and without each term.
     """
     names, slides, repeats, paper_repeats, scan_repeats, many = QUICK if options.quick else FULL
     costs, terms = dict[str, Any](), dict[str, Any]()
@@ -369,16 +353,10 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         fewer = slides // FEWER.get(name, 1)
         row = ablate(scene, variants(scene, touch_protocol), touch_protocol, fewer, repeats=repeats, seed=options.seed)
         terms[name] = with_paper(row, name, paper_repeats, 1000 + options.seed, quick=options.quick)
-    added = {}
-    for name in ADDED:
-        host, effect = load_scene(HOST), EFFECTS[name]()
-        more = replace(host, effects={**host.effects, name: effect})
-        row = ablate(more, {name: host}, TOUCH_PROTOCOLS[HOST], slides, repeats=repeats, seed=options.seed)
-        added[name] = {'strength': asdict(effect), **row}
     return BenchmarkResult(
         data='simulated scenes; slides of 2 and 3 s are cut to 1 s; terms that left a scene are put back for it',
         split=f'{slides} slides for training (jamali a third, sticky a fifth), others for test, {repeats} repetitions; '
         f"the papers' methods on {paper_repeats} sets of slides as many as in the paper; intervals of {CONFIDENCE:.0%}",
-        numbers={'scan_ms': costs, 'terms': terms, 'added': added},
-        charts=(ablation_chart({'terms': terms, 'added': added}, options.out / 'scenes_ablation.png'),),
+        numbers={'scan_ms': costs, 'terms': terms},
+        charts=(ablation_chart({'terms': terms}, options.out / 'scenes_ablation.png'),),
     )

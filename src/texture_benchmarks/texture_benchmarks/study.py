@@ -47,8 +47,6 @@ class BenchmarkOptions:
     data: Path | None = None
     seed: int = 0  # Of everything random
     quick: bool = False  # Fewer repetitions, for tests; such numbers are not for publishing
-    budget_s: float = math.inf  # After this time a study that has parts ends with those that it has
-    only: str = ''  # The one data set of `generalisation` that is measured; '' for all
 
     def has(self, name: str) -> bool:
         """Return whether there is a recorded data set of this name."""
@@ -108,12 +106,10 @@ def map_forked(work: Callable[[Job], Out], jobs: Sequence[Job]) -> list[Out]:
     return [found[place] for place in range(len(jobs))]
 
 
-def resumed(
-    work: Callable[[Job], Out], jobs: Mapping[str, Job], path: Path, options: BenchmarkOptions
-) -> dict[str, Out]:
-    """Return work(job) by the name of each part; those that an earlier run has written to the file come from there.
+def resumed(work: Callable[[Job], Out], jobs: Mapping[str, Job], path: Path) -> dict[str, Out]:
+    """Return work(job) by the name of each part; those that an interrupted run has written to the file come from there.
 
-    A part that fails is named, one that lasts beyond the budget is ended. The file goes when nothing is missing.
+    A part that fails is named. The file goes when nothing is missing.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     lines = path.read_text(encoding='utf-8').splitlines() if path.is_file() else []
@@ -122,7 +118,7 @@ def resumed(
         print(f"{len(found)} parts are of an earlier run, from '{path}'; remove it to compute all again", flush=True)
     left = [name for name in jobs if name not in found]
     with path.open('a', encoding='utf-8') as file:
-        for place, future in _forked(lambda name: work(jobs[name]), left, options.budget_s):
+        for place, future in _forked(lambda name: work(jobs[name]), left):
             if (error := future.exception()) is not None:
                 print(f'{left[place]} failed: {type(error).__name__}: {error}', flush=True)
                 continue
@@ -134,10 +130,8 @@ def resumed(
     return {name: found[name] for name in jobs if name in found}
 
 
-def _forked(
-    work: Callable[[Job], Out], jobs: Sequence[Job], budget_s: float = math.inf
-) -> Iterator[tuple[int, Future[Out]]]:
-    """Yield the places of jobs and what they came to, as they are finished; what lasts beyond the budget is ended."""
+def _forked(work: Callable[[Job], Out], jobs: Sequence[Job]) -> Iterator[tuple[int, Future[Out]]]:
+    """Yield the places of jobs and what they came to, as they are finished."""
     context = multiprocessing.get_context('fork')
     count = min(len(jobs), len(os.sched_getaffinity(0)))
     others = multiprocessing.active_children()
@@ -145,12 +139,10 @@ def _forked(
     places = {pool.submit(_do, job): place for place, job in enumerate(jobs)}
     begun = [process for process in multiprocessing.active_children() if process not in others]
     try:
-        for future in as_completed(places, None if math.isinf(budget_s) else budget_s):
+        for future in as_completed(places):
             if isinstance(future.exception(), BrokenProcessPool):
                 raise DeviceError('a measurement ended without a result; see above, or give it more memory')
             yield places[future], future
-    except TimeoutError:
-        print(f'ended after {budget_s:g} s', flush=True)
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
         for process in begun:

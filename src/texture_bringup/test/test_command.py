@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import MagicMock
 
 import pytest
 from rcl_interfaces.msg import ParameterType
@@ -108,41 +109,20 @@ def test_a_shell_completes_sub_commands_and_options(line, wanted):
     assert wanted in done.stdout.split()
 
 
-class Answering:
-    """Stand in for the operator: note what is called, and answer."""
-
-    def __init__(self, answer):
-        self.answer, self.namespaces, self.called = answer, [], []
-
-    def __call__(self, namespace):
-        self.namespaces.append(namespace)
-        return self
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        pass
-
-    def call(self, service, _advice):
-        self.called.append(service)
-        return self.answer
-
-
 NODES = {'tare': 'sensor'}  # the others are of the explorer
 SERVICES = ['stop', 'recover', 'lift', 'reboot', 'touch-surface', 'forget-touches', 'tare']
 
 
 @pytest.mark.parametrize(('name', 'success'), [*((name, True) for name in SERVICES), ('stop', False)])
 def test_a_command_calls_its_service_and_ends_with_its_success(name, success, monkeypatch, capsys):
-    operator = Answering((success, 'as it is'))
+    operator = MagicMock()
+    call = operator.return_value.__enter__.return_value.call
+    call.return_value = success, 'as it is'
     monkeypatch.setattr('texture_bringup.commands.services.Operator', operator)
     assert main([name, '--namespace', 'left']) == (0 if success else 1)
     assert capsys.readouterr().out == 'as it is\n'
-    assert (operator.namespaces, operator.called) == (
-        ['left'],
-        [f'{NODES.get(name, "explorer")}/{name.replace("-", "_")}'],
-    )
+    operator.assert_called_once_with('left')
+    assert call.call_args.args[0] == f'{NODES.get(name, "explorer")}/{name.replace("-", "_")}'
 
 
 @pytest.mark.realtime

@@ -26,7 +26,6 @@ from texture_bringup.demo import (
     FIRST_UNICAST,
     PORTS_PER_DOMAIN,
     UNKNOWN,
-    ProgressLog,
     Slide,
     free_domain,
     slide_over,
@@ -105,7 +104,7 @@ def test_an_aborted_slide_and_a_rejected_one_over_a_trained_surface_are_made_aga
 
     operator = SimpleNamespace(explore=explore, set_parameters=lambda *_: None)
     request = ExplorationRequest('linear_slide', surface='felt')
-    slide = slide_over(operator, request, 'felt', expected, ProgressLog())
+    slide = slide_over(operator, request, 'felt', expected)
     assert (slide.answer.exploration_id, list(made)) == (last, [])
     assert capsys.readouterr().out.count('trying again') == len(ends) - 1
 
@@ -114,7 +113,7 @@ def test_an_aborted_slide_and_a_rejected_one_over_a_trained_surface_are_made_aga
 def test_it_accepts_trained_surfaces_and_rejects_others_and_leaves_a_picture(tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.setattr(demo, 'RECOGNISED', ('glass', 'ridge_2mm_deep'))
     monkeypatch.setattr(demo, 'UNTRAINED', ('cardboard',))
-    right = demo.demonstrate(tmp_path / 'demo', 'default', 0, ProgressLog())
+    right = demo.demonstrate(tmp_path / 'demo', 'default', 0)
     said = capsys.readouterr().out
     assert right, said
     for line in (

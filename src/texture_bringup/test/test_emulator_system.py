@@ -1,14 +1,20 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The emulator as a user starts it, in a namespace and a ROS domain of its own."""
+"""The emulator and the page of the operator as a user starts them, in a namespace and a ROS domain of their own."""
 
+import asyncio
+import json
 import os
 import re
 import signal
+import socket
+import urllib.request
+from concurrent.futures import ThreadPoolExecutor
 from fnmatch import fnmatch
 from pathlib import Path
 from xml.etree import ElementTree
 
+import aiohttp
 import pytest
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
@@ -24,6 +30,8 @@ from texture_evaluation.train import train_from_bags, train_grades_from_bags
 DOMAIN = 61
 PATIENT = '/**: {ros__parameters: {estimate_timeout_s: 10.0, signal_timeout_s: 3.0}}'  # this machine may be busy
 DEADLINE_S = 60.0
+NODES = {'emulator', 'sensor', 'explorer', 'feature_extractor', 'classifier', 'dashboard'}
+NODES |= {'roughness_features', 'roughness_estimator'}
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.05, surface='ridge_2mm_deep')
 STARTED = re.compile(r'\[launch\] (\S+) started \(process (\d+)\)')
 
@@ -31,12 +39,6 @@ STARTED = re.compile(r'\[launch\] (\S+) started \(process (\d+)\)')
 @pytest.fixture(scope='module')
 def folder(tmp_path_factory):
     return tmp_path_factory.mktemp('emulator')
-
-
-def launched(folder: Path, **arguments: object) -> ChildLauncher:
-    environment = {**os.environ, 'ROS_DOMAIN_ID': str(DOMAIN), 'ROS_LOG_DIR': str(folder)}
-    given = {'devices': folder, 'namespace': 'left', **arguments}
-    return ChildLauncher('emulator', given, environment, folder / 'nodes.log')
 
 
 def processes(launcher: ChildLauncher) -> dict[str, int]:
@@ -62,12 +64,20 @@ def roughness_model(folder, bags):
 
 
 @pytest.fixture(scope='module')
-def emulator(folder, roughness_model):
+def port():
+    with socket.socket() as probe:
+        probe.bind(('127.0.0.1', 0))
+        return probe.getsockname()[1]
+
+
+@pytest.fixture(scope='module')
+def emulator(folder, roughness_model, port):
     patient = folder / 'patient.yaml'
     patient.write_text(PATIENT)
-    with launched(
-        folder, surface='ridge_2mm_deep', roughness_model=roughness_model, explorer_params=patient
-    ) as launcher:
+    environment = {**os.environ, 'ROS_DOMAIN_ID': str(DOMAIN), 'ROS_LOG_DIR': str(folder)}
+    given = {'devices': folder, 'namespace': 'left', 'surface': 'ridge_2mm_deep', 'roughness_model': roughness_model}
+    given |= {'explorer_params': patient, 'dashboard': 'true', 'dashboard_port': port}
+    with ChildLauncher('emulator', given, environment, folder / 'nodes.log') as launcher:
         yield launcher
 
 
@@ -121,6 +131,58 @@ def test_a_model_of_simulated_slides_recognises_the_surface_of_the_emulator(oper
     assert '8 slides could be held out' in explored.texture.message
 
 
+# Slow enough that there is time to press stop on a busy machine.
+LONG = {'motion': 'linear_slide', 'speed_m_s': 0.005, 'force_n': 1.0, 'distance_m': 0.15}
+SHORT = {'motion': 'linear_slide', 'speed_m_s': 0.05, 'force_n': 1.0, 'distance_m': 0.08}
+
+
+class Wire:
+    """The requests that the page sends, and the frames that it gets."""
+
+    def __init__(self, address):
+        self._address = address
+        self.until(lambda frame: {light['name'] for light in frame['lights'] if light['colour'] == 'green'} == NODES)
+
+    def post(self, name, body):
+        request = urllib.request.Request(
+            f'{self._address}api/{name}', json.dumps(body).encode(), {'Content-Type': 'application/json'}
+        )
+        with urllib.request.urlopen(request, timeout=DEADLINE_S) as answer:
+            return json.load(answer)['message']
+
+    def until(self, condition):
+        newest = None
+
+        async def watch():
+            nonlocal newest
+            async with aiohttp.ClientSession() as session, session.ws_connect(f'{self._address}ws') as frames:
+                async for frame in frames:
+                    newest = json.loads(frame.data)
+                    if condition(newest):
+                        return
+
+        try:
+            asyncio.run(asyncio.wait_for(watch(), DEADLINE_S))
+        except TimeoutError:
+            pytest.fail(f'the deadline passed; the newest frame: {newest}')
+
+
+def test_an_operator_explores_sees_the_estimate_tares_and_stops_the_next_exploration(operator, port) -> None:
+    page = Wire(f'http://127.0.0.1:{port}/')
+    # A busy machine delays the emulated arm, and the explorer aborts: once more, as an operator would.
+    said = next((said for _ in range(3) if 'completed' in (said := page.post('explore', SHORT))), '')
+    assert said
+    page.until(lambda frame: frame['texture']['final'] and frame['texture']['label'] == 'ridge_2mm_deep')
+    # Too few samples come while the machine is busy; the operator is told so, and presses again.
+    assert any(page.post('tare', {}).endswith(' tared') for _ in range(5))
+    with ThreadPoolExecutor() as pool:
+        aborted = pool.submit(page.post, 'explore', LONG)
+        page.until(lambda frame: frame['state']['phase'] == 'slide')
+        assert 'lifted' in page.post('stop', {})
+        assert 'stopped on request' in aborted.result(DEADLINE_S)
+    page.until(lambda frame: frame['past'][0]['phase'] == 'aborted')
+
+
 def test_the_sample_can_be_swapped_and_an_unknown_one_gets_the_nearest(operator) -> None:
     operator.set_parameters('emulator', {'surface': 'glass'})
     assert operator.explore(SLIDE).texture.label == 'glass'
@@ -139,8 +201,7 @@ def test_a_model_of_another_recipe_is_not_used_and_the_estimate_says_so(operator
 
 def test_the_death_of_a_node_is_noticed_with_its_name_and_nothing_is_left(operator, emulator) -> None:
     pids = processes(emulator)
-    names = ('emulator', 'sensor', 'explorer', 'feature_extractor', 'classifier')
-    assert set(pids) == {f'left/{name}' for name in (*names, 'roughness_features', 'roughness_estimator')}
+    assert set(pids) == {f'left/{name}' for name in NODES}
     os.kill(pids['left/classifier'], signal.SIGKILL)
     with pytest.raises(LaunchFailed, match='the launch ended because left/classifier was killed by SIGKILL'):
         for _ in range(1000):

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What `texture explore` prints when an exploration does not come to its end."""
 
-import contextlib
 import math
 from types import SimpleNamespace
 from unittest.mock import MagicMock
@@ -11,7 +10,8 @@ import numpy as np
 import pytest
 
 from texture_bringup.command import main
-from texture_bringup.commands.explore import explored, texture_text
+from texture_bringup.commands.explore import explored
+from texture_bringup.feed import texture_text
 from texture_bringup.operator import ExplorationResult
 from texture_core.cli import run_program
 from texture_core.errors import ExplorationError, MotionAborted
@@ -34,17 +34,6 @@ OUTSIDE = 'outside the training: speed 0.02 m/s, trained 0.05 m/s'
 ENDED = 'the exploration has ended: cancelled by the client'
 
 
-class EndingOperator:
-    """An operator whose exploration ends in mid-slide."""
-
-    def __init__(self, error):
-        self._error = error
-
-    def explore(self, _request, on_progress):
-        on_progress(ExplorationState(0, 'one', 'linear_slide', Phase.SLIDE), TextureEstimate(0, 'one'))
-        raise self._error
-
-
 @pytest.mark.parametrize(
     ('error', 'lines'),
     [
@@ -53,39 +42,35 @@ class EndingOperator:
     ],
 )
 def test_what_ended_an_exploration_stands_on_lines_of_its_own_below_the_progress(monkeypatch, capsys, error, lines):
+    def explore(_request, on_progress):
+        on_progress(ExplorationState(0, 'one', 'linear_slide', Phase.SLIDE), TextureEstimate(0, 'one'))
+        raise error
+
     monkeypatch.setattr('sys.stderr.isatty', lambda: True)
-    run_program(lambda: explored(EndingOperator(error).explore, ExplorationRequest('linear_slide')))
+    run_program(lambda: explored(explore, ExplorationRequest('linear_slide')))
     progress, *below = capsys.readouterr().err.splitlines()
     assert progress.strip() == ''  # the terminal returns to the beginning of the line before it draws
     assert below[0].startswith('slide')
     assert below[1:] == lines
 
 
-@pytest.mark.parametrize('last', ['aborted', 'refused', 'vanished'])
-def test_slides_in_several_directions_end_with_the_first_that_fails(monkeypatch, capsys, last):
+@pytest.mark.parametrize('json', [[], ['--json']], ids=['text', 'json'])
+@pytest.mark.parametrize(('last', 'code'), [('aborted', 4), ('refused', 2), ('vanished', 4)])
+def test_slides_in_several_directions_end_with_the_first_that_fails(monkeypatch, capsys, last, code, json):
     """Whatever aborted a slide, somebody has to look at it: an operator who is away must not find the finger worn."""
     nothing = TextureEstimate(0, ''), RoughnessEstimate(0, '')
-    asked = []
-
-    class FailingOperator(contextlib.nullcontext):
-        wait_for_explorer = staticmethod(lambda *_: None)
-
-        def explore(self, request, _on_progress):
-            asked.append(round(math.degrees(request.direction_rad)))
-            if len(asked) < 3:
-                return ExplorationResult(ExplorationError.NONE, 'the motion was completed', 'one', *nothing)
-            if last == 'vanished':
-                raise MotionAborted('the explorer has vanished')
-            return ExplorationResult(
-                ExplorationError.FORCE_LIMIT, 'too hard', '' if last == 'refused' else 'three', *nothing
-            )
-
-        def __enter__(self):
-            return self
-
-    monkeypatch.setattr('texture_bringup.commands.explore.Operator', FailingOperator)
-    assert main(['explore', 'linear_slide', '--direction', '0', '180', '45.5', '180']) != 0
-    assert asked == [0, 180, 46]
+    made = ExplorationResult(ExplorationError.NONE, 'the motion was completed', 'one', *nothing)
+    ends = {
+        'vanished': MotionAborted('the explorer has vanished'),
+        'refused': ExplorationResult(ExplorationError.FORCE_LIMIT, 'too hard', '', *nothing),
+        'aborted': ExplorationResult(ExplorationError.FORCE_LIMIT, 'too hard', 'three', *nothing),
+    }
+    operator = MagicMock()
+    operator.__enter__.return_value.explore.side_effect = [made, made, ends[last]]
+    monkeypatch.setattr('texture_bringup.commands.explore.Operator', lambda _namespace: operator)
+    assert main(['explore', 'linear_slide', *json, '--direction', '0', '180', '45.5', '180']) == code
+    asked = [call.args[0] for call in operator.__enter__.return_value.explore.call_args_list]
+    assert [round(math.degrees(one.direction_rad)) for one in asked] == [0, 180, 46]
     assert '2 of 4 slides were made\n' in capsys.readouterr().err
 
 
@@ -99,29 +84,19 @@ def test_identify_makes_the_slide_that_distinguishes_textures_until_one_is_decid
     ]
     motions, textures, values = zip(*slides, strict=True)
     known = NextTouchModel.fit(np.array(values), textures, motions)
-    asked = []
-
-    class SlidingOperator(contextlib.nullcontext):
-        wait_for_explorer = staticmethod(lambda *_: None)
-
-        def __enter__(self):
-            return self
-
-        def explore_with_features(self, request, _on_progress):
-            asked.append(request.direction_rad)
-            ended = ExplorationResult(
-                ExplorationError.NONE, '', 'one', TextureEstimate(0, ''), RoughnessEstimate(0, '')
-            )
-            return ended, [FeatureVector(0, 'one', 0.5, 0.1, ('a',), np.array([10.0]), feature_set='kind')]
-
+    ended = ExplorationResult(ExplorationError.NONE, '', 'one', TextureEstimate(0, ''), RoughnessEstimate(0, ''))
+    seen = FeatureVector(0, 'one', 0.5, 0.1, ('a',), np.array([10.0]), feature_set='kind')
+    operator = MagicMock()
+    slide = operator.__enter__.return_value.explore_with_features
+    slide.return_value = ended, [seen]
     model = SimpleNamespace(name='m', next_touch_model=known, feature_set='kind')
     monkeypatch.setattr('texture_bringup.commands.explore.load_model', lambda _path: model)
-    monkeypatch.setattr('texture_bringup.commands.explore.Operator', SlidingOperator)
+    monkeypatch.setattr('texture_bringup.commands.explore.Operator', lambda _namespace: operator)
     assert main(['identify', 'm', '--sure', '0.9']) == 0
     said = capsys.readouterr().out
     assert said.startswith('slide 1: linear_slide, direction 0°, 0.1 m/s, 2 N, 0.5 s; ')
     assert 'texture: ridges_x, probability ' in said
-    assert set(asked) == {0.0}
+    assert {call.args[0].direction_rad for call in slide.call_args_list} == {0.0}
 
 
 @pytest.mark.parametrize(

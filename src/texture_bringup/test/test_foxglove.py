@@ -4,10 +4,12 @@
 
 import json
 import re
+import subprocess
 from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 from std_srvs.srv import Trigger
 from texture_msgs import srv
 
@@ -17,7 +19,8 @@ from texture_recordings.ros import TOPICS
 
 pytestmark = pytest.mark.ros  # needs the built messages
 
-LAYOUT = json.loads((Path(__file__).parents[1] / 'config' / 'foxglove.json').read_text())
+CONFIG, PAGE = Path(__file__).parents[1] / 'config', Path(__file__).parents[3] / 'docs' / 'interfaces.md'
+LAYOUT = json.loads((CONFIG / 'foxglove.json').read_text())
 FIELD = re.compile(r'^((?:/\w+)+)(?:\.(\w+)(\[(?::|\d+)\])?)?$')
 PANELS = LAYOUT['configById']
 BUTTONS = {name: config for name, config in PANELS.items() if name.startswith('CallService!')}
@@ -70,6 +73,15 @@ def test_a_button_calls_a_service_of_a_node_with_a_request_that_fits(button: str
     assert name in offered
     values = json.loads(BUTTONS[button]['requestPayload'])
     filled(REQUESTS.get(name, Trigger).Request(), values)
+
+
+@pytest.mark.parametrize('file', ['foxglove.json', 'views.rviz'])
+def test_the_line_of_the_page_moves_all_topics_services_and_frames_into_a_namespace(file: str) -> None:
+    [script] = re.findall(r"^ {4}sed -E '(.+)' foxglove", PAGE.read_text(), re.MULTILINE)
+    moved = subprocess.run(['sed', '-E', script, CONFIG / file], check=True, capture_output=True, text=True).stdout
+    content = yaml.safe_load(moved)  # JSON is YAML
+    assert {path.split('/')[1] for path in paths(content)} - {'diagnostics'} == {'left'}
+    assert set(re.findall(r'(?:followTf|frameId|Frame)"?: "?([\w/]+)', moved)) == {'left/surface'}
 
 
 def test_an_operator_has_a_button_for_each_of_his_actions() -> None:

@@ -91,6 +91,11 @@ def test_an_argument_that_names_a_pipe_is_refused_at_once_unless_it_is_a_device(
         ('<node pkg="p" exec="e" respawn_delay="soon"/>', 'a number is needed'),
         ('<node pkg="p" exec="e" respawn_max_retries="2.5"/>', 'a whole number is needed'),
         ('<node pkg="p" exec="e"><param name="x" value="1" type="flaot"/></node>', "did you mean 'float'"),
+        ('<node pkg="p" exec="e"><param name="x" value="{a: 1}"/></node>', 'a number or a text is needed'),
+        ('<node pkg="p" exec="e"><param name="x" value="null"/></node>', 'a number or a text is needed'),
+        ('<let name="x" value="$(var x"/>', 'write $(name argument'),
+        ('<let name="x" value="$(var  x)"/>', 'closed and with single spaces'),
+        ('<let name="x" value="$()"/>', 'write $(name argument'),
         ('<include file="FOLDER/a.launch.xml"/>', 'include itself'),
         ('<include file="FOLDER/b.launch.xml"><arg name="m" value="1"/></include>', "no argument of b.launch.xml 'm'"),
         ('<include file="FOLDER/robot.launch.xml"/>', '<launch> is needed'),
@@ -170,9 +175,6 @@ def test_a_namespace_is_joined_unless_it_is_absolute(base, name, joined) -> None
     assert joined_namespace(base, name) == joined
 
 
-REFUSED = object()
-
-
 @pytest.mark.parametrize(
     ('text', 'type_name', 'value'),
     [
@@ -187,20 +189,11 @@ REFUSED = object()
         ('5', 'float', 5.0),
         ('1e3', 'float', 1000.0),
         ('1', 'bool', True),
-        ('rough', 'float', REFUSED),
-        ('cork', 'int', REFUSED),
-        ('{a: 1}', 'yaml', REFUSED),
-        ('null', 'yaml', REFUSED),
-        ('[1, 2]', 'yaml', REFUSED),
     ],
 )
 def test_values_are_typed_as_yaml_does_unless_a_type_is_given(text, type_name, value) -> None:
-    if value is REFUSED:
-        with pytest.raises(InvalidLaunch, match=r'it is .* is needed'):
-            typed(text, type_name, 'it')
-    else:
-        got = typed(text, type_name, 'it')
-        assert (got, type(got)) == (value, type(value))
+    got = typed(text, type_name, 'it')
+    assert (got, type(got)) == (value, type(value))
 
 
 def shown(name, arguments):
@@ -220,12 +213,6 @@ def shown(name, arguments):
 )
 def test_calls_are_expanded_innermost_first_and_all_else_stays(text, expanded) -> None:
     assert expand(text, shown) == expanded
-
-
-@pytest.mark.parametrize('text', ['$(var x', '$()', '$(var  x)', '$(var "x)', '$(5)'])
-def test_a_call_that_is_not_well_formed_is_refused_with_the_form(text) -> None:
-    with pytest.raises(InvalidLaunch, match='write'):
-        expand(text, shown)
 
 
 @pytest.mark.parametrize('file', ['emulator', 'tactile'])

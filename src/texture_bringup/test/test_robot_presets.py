@@ -13,7 +13,7 @@ import yaml
 from texture_bringup.launcher import find_launch_file, read
 from texture_core import config as resources
 from texture_core.config import parameters_of
-from texture_core.errors import InvalidLaunch, UnknownName
+from texture_core.errors import InvalidLaunch
 from texture_exploration.arms.arm import SurfacePoseParams
 from texture_exploration.arms.in_hand import InHandParams
 from texture_exploration.arms.rails import RailsParams
@@ -89,11 +89,6 @@ def test_a_real_robot_comes_without_anything_emulated(robot):
         read(path, {'emulated': 'false'}, {})
     assert {node.package for node in emulated} - {node.package for node in real} == {'texture_simulation'}
     assert {node.executable for node in real} == {'explorer', 'sensor', 'feature_extractor', 'classifier'}
-
-
-def test_an_unknown_preset_gets_the_nearest():
-    with pytest.raises(UnknownName, match="'moveit_servo'"):
-        read(find_launch_file('ros_controllers'), {'preset': 'moveit_serv'}, {})
 
 
 @pytest.mark.parametrize('robot', ROBOTS)

@@ -38,6 +38,8 @@ def test_links_and_joints_form_one_tree_below_the_flange(robot: Element) -> None
     assert set(joints) == set(links) - {'tool0'}
     assert joints['left/fingertip'] == 'left/tsf85'
     assert joints['left/tsf85'] == 'tool0'
+    assert not [element.tag for element in robot.iter() if 'xacro' in element.tag]
+    assert not [value for element in robot.iter() for value in element.attrib.values() if '$' in value]
 
 
 def test_the_frame_of_the_fingertip_lies_on_the_contact_side(robot: Element) -> None:
@@ -57,8 +59,3 @@ def test_the_inertia_is_that_of_a_solid_box(robot: Element) -> None:
     inertia = inertial.find('inertia')
     assert float(inertial.find('mass').get('value')) == mass
     assert {axis: float(inertia.get(axis)) for axis in expected} == pytest.approx(expected)
-
-
-def test_nothing_of_xacro_is_left(robot: Element) -> None:
-    assert not [element.tag for element in robot.iter() if 'xacro' in element.tag]
-    assert not [value for element in robot.iter() for value in element.attrib.values() if '$' in value]

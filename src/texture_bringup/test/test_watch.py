@@ -48,7 +48,7 @@ def test_a_recording_is_shown_as_a_line_for_each_change_without_a_terminal(bag, 
     lines = capsys.readouterr().out.splitlines()
     slide = next(one for one in lines if 'cork' in one and one.startswith('slide'))
     assert '0.050 m/s  1.00 N' in slide
-    assert 'cork, confidence 0.61 after 0.6 s, rejected: novel' in slide
+    assert 'unknown (nearest: cork, confidence 0.61 after 0.6 s): it resembles no trained texture' in slide
     assert lines[-1].startswith('done')
 
 

@@ -172,13 +172,9 @@ class Recorder:
 
     def watch(self) -> None:
         """Note a recording that ended on an error."""
-        child = self._child
-        if child is None:
-            return
-        try:
-            child.check()
-        except LaunchFailed as error:
-            self._child, self.bag, self.fault = None, '', str(error)
+        if self._child is not None and self._child.end:
+            self.fault = f'{self._child.end}; the output of all nodes is in {self._child.log}'
+            self._child, self.bag = None, ''
 
 
 # --------------------
@@ -267,6 +263,9 @@ def make_app(commands: Any, access: Access, page: Path) -> web.Application:
         text = (page / file).read_text(encoding='utf-8')
         return web.Response(text=text, content_type=kind, charset='utf-8')
 
+    async def secure(_request: web.Request, response: web.StreamResponse) -> None:
+        response.headers.update(HEADERS)
+
     async def close(_app: web.Application) -> None:
         for viewer in tuple(viewers.sockets):
             await viewer.close(code=WSCloseCode.GOING_AWAY)
@@ -277,6 +276,7 @@ def make_app(commands: Any, access: Access, page: Path) -> web.Application:
         app.router.add_post(f'/api/{name}', _command(getattr(commands, name)))
     for path in PAGE:
         app.router.add_get(path, static)
+    app.on_response_prepare.append(secure)
     app.on_shutdown.append(close)
     return app
 
@@ -291,15 +291,9 @@ def _guard(access: Access) -> Any:
         try:
             refusal = _refusal(access, guesses, request)
             # Not `or`: to Ubuntu's aiohttp, 3.9, a response in which nothing was stored is false.
-            response = await handler(request) if refusal is None else refusal
-        except web.HTTPException as error:
-            error.headers.update(HEADERS)
-            raise
+            return await handler(request) if refusal is None else refusal
         finally:
             request.app[BUSY].discard(request.protocol)
-        if not response.prepared:
-            response.headers.update(HEADERS)
-        return response
 
     return guard
 

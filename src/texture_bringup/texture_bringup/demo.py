@@ -135,19 +135,17 @@ class Slide:
 # What the demonstration prints while it runs, for a reader who sees the suite for the first time.
 
 
-class ProgressLog:
-    """Print the progress, each section with the time since the start."""
+START_S = time.monotonic()
 
-    def __init__(self) -> None:
-        self._start_s = time.monotonic()
 
-    def section(self, text: str) -> None:
-        """Begin something new."""
-        print(f'\n[{time.monotonic() - self._start_s:3.0f} s]  {text}', flush=True)
+def section(text: str) -> None:
+    """Begin something new, with the time since the start."""
+    print(f'\n[{time.monotonic() - START_S:3.0f} s]  {text}', flush=True)
 
-    def line(self, text: str) -> None:
-        """Print a line within the section."""
-        print(f'{" " * 8}{text}', flush=True)
+
+def line(text: str) -> None:
+    """Print a line within the section."""
+    print(f'{" " * 8}{text}', flush=True)
 
 
 # --------------------
@@ -174,11 +172,11 @@ START_DEADLINE_S = 60.0  # a slow machine that imports everything for the first 
 ATTEMPTS = 3  # a machine that is busy with something else delays the emulated arm, and the explorer aborts
 
 
-def demonstrate(out: Path, recipe: str, seed: int, progress: ProgressLog, *, dashboard: bool = False) -> bool:
+def demonstrate(out: Path, recipe: str, seed: int, *, dashboard: bool = False) -> bool:
     """Train, recognise and reject on the emulator, and report; return whether every answer was as expected."""
     _clear(out)
-    _train(out, recipe, seed, progress)
-    progress.section('Starting the emulator: surfaces, arm and sensor are simulated, all other nodes are the real ones')
+    _train(out, recipe, seed)
+    section('Starting the emulator: surfaces, arm and sensor are simulated, all other nodes are the real ones')
     with tempfile.TemporaryDirectory(prefix='texture_demo_') as name:
         folder = Path(name)
         (folder / 'explorer.yaml').write_text(f'/**/explorer: {{ros__parameters: {{edge_m: {EDGE_M}}}}}\n')
@@ -202,29 +200,29 @@ def demonstrate(out: Path, recipe: str, seed: int, progress: ProgressLog, *, das
             operator.wait_for_signal(START_DEADLINE_S)
             if dashboard:
                 operator.wait_for_node('dashboard', START_DEADLINE_S)
-                progress.line(f'dashboard: http://127.0.0.1:{arguments["dashboard_port"]} while this runs')
-            slides = _explore(operator, progress)
-    _report(slides, out, progress)
+                line(f'dashboard: http://127.0.0.1:{arguments["dashboard_port"]} while this runs')
+            slides = _explore(operator)
+    _report(slides, out)
     return all(slide.as_expected for slide in slides)
 
 
-def _train(out: Path, recipe: str, seed: int, progress: ProgressLog) -> None:
+def _train(out: Path, recipe: str, seed: int) -> None:
     """Simulate a session of slides over each surface, and train both models on them."""
-    progress.section(f'Simulating {TRAINING_SLIDES} slides over each of {len(TRAINED)} surfaces')
+    section(f'Simulating {TRAINING_SLIDES} slides over each of {len(TRAINED)} surfaces')
     slides = SlidePlan(TRAINING_SLIDES, SPEED_M_S, FORCE_N, DISTANCE_M / SPEED_M_S)
     bags = write_simulated(out / TRAINING, slides, np.random.default_rng(seed), surfaces=tuple(TRAINED))
-    progress.section('Training a texture model and a roughness model (as `texture train` does)')
+    section('Training a texture model and a roughness model (as `texture train` does)')
     model = train_from_bags(recipe, bags, out=out / MODEL)
     rows = [f'{surface},{grade}' for surface, grade in TRAINED.items()]
     (out / GRADES).write_text('\n'.join(['texture,grade', *rows, '']))
     train_grades_from_bags('roughness', bags, out / GRADES, out=out / ROUGHNESS)
     reasons = (model.acceptance.reason, model.acceptance.decided_reason)
-    progress.line(f'trained on {len(TRAINED)} surfaces: {", ".join(TRAINED)}')
+    line(f'trained on {len(TRAINED)} surfaces: {", ".join(TRAINED)}')
     for reason in filter(None, reasons):
-        progress.line(reason)
+        line(reason)
 
 
-def _explore(operator: Operator, progress: ProgressLog) -> list[Slide]:
+def _explore(operator: Operator) -> list[Slide]:
     """Make all slides, and print what was answered to each."""
     slides: list[Slide] = []
 
@@ -237,16 +235,16 @@ def _explore(operator: Operator, progress: ProgressLog) -> list[Slide]:
             surface=surface,
             early_stopping=True,
         )
-        slides.append(slide_over(operator, replace(usual, **changes), title, expected, progress))
-        progress.line(f'{"✓" if slides[-1].as_expected else "✗"} {title:<28}{slides[-1].outcome}')
+        slides.append(slide_over(operator, replace(usual, **changes), title, expected))
+        line(f'{"✓" if slides[-1].as_expected else "✗"} {title:<28}{slides[-1].outcome}')
 
-    progress.section('Trained surfaces: a slide ends as soon as the evidence is enough')
+    section('Trained surfaces: a slide ends as soon as the evidence is enough')
     for surface in RECOGNISED:
         slide(surface, surface, ACCEPTED)
-    progress.section('Surfaces that were never trained')
+    section('Surfaces that were never trained')
     for surface in UNTRAINED:
         slide(surface, surface, UNKNOWN)
-    progress.section('A speed that was not trained, and a slide over the edge of the sample')
+    section('A speed that was not trained, and a slide over the edge of the sample')
     shown, speed_m_s = RECOGNISED[-1], UNTRAINED_SPEED_M_S
     as_long = DISTANCE_M * speed_m_s / SPEED_M_S  # in time
     slide(shown, f'{shown} at {speed_m_s:g} m/s', OUTSIDE, speed_m_s=speed_m_s, distance_m=as_long)
@@ -254,13 +252,7 @@ def _explore(operator: Operator, progress: ProgressLog) -> list[Slide]:
     return slides
 
 
-def slide_over(
-    operator: Operator,
-    request: ExplorationRequest,
-    title: str,
-    expected: frozenset[Rejection],
-    progress: ProgressLog,
-) -> Slide:
+def slide_over(operator: Operator, request: ExplorationRequest, title: str, expected: frozenset[Rejection]) -> Slide:
     """Put the surface of a request under the finger and slide.
 
     A slide that is aborted, or rejected over a trained surface, is made again, twice at most: by its calibration the
@@ -275,16 +267,16 @@ def slide_over(
         rejected = expected == ACCEPTED and answer.texture.rejection is not Rejection.NONE
         if not left or (made.ended and not rejected):
             break
-        progress.line(f'· {title:<28}{made.outcome}; trying again')
+        line(f'· {title:<28}{made.outcome}; trying again')
     return made
 
 
-def _report(slides: Sequence[Slide], out: Path, progress: ProgressLog) -> None:
+def _report(slides: Sequence[Slide], out: Path) -> None:
     """Draw the picture, and count the answers that are right."""
     draw([slide for slide in slides if slide.expected], out / PICTURE)
     right = sum(slide.as_expected for slide in slides)
-    progress.section(f'Done: {right} of {len(slides)} results as expected. Look at {out / PICTURE}')
-    progress.line(f'training slides, models and the log of the nodes are in {out}/')
+    section(f'Done: {right} of {len(slides)} results as expected. Look at {out / PICTURE}')
+    line(f'training slides, models and the log of the nodes are in {out}/')
 
 
 def draw(slides: Sequence[Slide], path: Path) -> None:

@@ -180,6 +180,27 @@ def places_of(channels: tuple[str, ...]) -> list[tuple[int, int]]:
 
 
 # --------------------
+# Estimates as texts for people.
+
+UNLIKE = 'it resembles no trained texture'
+
+
+def texture_text(estimate: TextureEstimate) -> str:
+    """Return a texture estimate as text, with the reason if it is rejected."""
+    if not estimate.label:
+        return estimate.message or 'none yet'
+    nearest = f'{estimate.label}, confidence {estimate.confidence:.2f} after {estimate.evidence_s:.1f} s'
+    return nearest if estimate.accepted else f'unknown (nearest: {nearest}): {estimate.message or UNLIKE}'
+
+
+def roughness_text(estimate: RoughnessEstimate) -> str:
+    """Return a roughness estimate as text."""
+    if not estimate.valid:
+        return estimate.message
+    return f'{estimate.grade:.1f} ± {estimate.grade_std:.1f} on the scale from 1 (smooth) to 5 (rough)'
+
+
+# --------------------
 # What the page shows: the newest messages, in bounded memory, as one JSON text per frame.
 
 FRAME_PERIOD_S = 0.1
@@ -272,9 +293,9 @@ class Feed:
             'signal': self._signal(),
             'spectrum': self._spectrum(),
             'taxels': self._image(),
-            'state': self._shown_state(),
+            'state': _shown(self._state),
             'texture': self._evidence(),
-            'roughness': {name: _plain(value) for name, value in asdict(self._roughness).items()},
+            'roughness': {**_shown(self._roughness), 'text': roughness_text(self._roughness)},
             'lights': self.node_statuses.shown(time_s),
             'past': list(reversed(self._past.values())),
             'recording': self.recording,
@@ -302,18 +323,14 @@ class Feed:
         least = {'least_range': _number(taxels.least_range)}
         return {'values': _numbers(taxels.image), 'places': taxels.places, 'unit': taxels.unit, **least}
 
-    def _missing(self, what: str, name: str) -> str:
-        """Return that there is no estimate yet, with the status of its node if that is not OK."""
-        status = self.node_statuses.newest(name)
+    def _missing(self) -> str:
+        """Return that there is no estimate yet, with the status of the classifier if that is not OK."""
         if self.recorded:
-            return f'no {what}'
-        if status is None:
-            return f'no {what} yet, and no {name} reports on /diagnostics'
-        level, message = status
-        return f'no {what} yet' + ('' if level == 'OK' else f': {message}')
-
-    def _shown_state(self) -> dict[str, Any]:
-        return {name: _plain(value) for name, value in asdict(self._state).items()}
+            return 'no estimate'
+        level, message = self.node_statuses.newest('classifier') or ('', '')
+        if not level:
+            return 'no estimate yet, and no classifier reports on /diagnostics'
+        return 'no estimate yet' + ('' if level == 'OK' else f': {message}')
 
     def _evidence(self) -> dict[str, Any]:
         """Return the estimate with the most probable labels first."""
@@ -321,11 +338,20 @@ class Feed:
         fits = (estimate.model, estimate.revision) == (model.model, model.revision)  # else the labels come in a moment
         labels = model.labels if fits else ()
         pairs = sorted(zip(estimate.probabilities, labels, strict=False), reverse=True)[:MAX_LABELS]
-        shown = {name: _plain(value) for name, value in asdict(estimate).items()} | {'accepted': estimate.accepted}
-        shown['missing'] = '' if estimate.label or estimate.message else self._missing('estimate', 'classifier')
-        shown['labels'] = [label for _, label in pairs]
-        shown['probabilities'] = _numbers(probability for probability, _ in pairs)
-        return shown
+        missing = '' if estimate.label or estimate.message else self._missing()
+        return {
+            **_shown(estimate),
+            'accepted': estimate.accepted,
+            'missing': missing,
+            'text': missing or texture_text(estimate),
+            'labels': [label for _, label in pairs],
+            'probabilities': _numbers(probability for probability, _ in pairs),
+        }
+
+
+def _shown(values: Any) -> dict[str, Any]:
+    """Return the fields of a dataclass as JSON can carry them."""
+    return {name: _plain(value) for name, value in asdict(values).items()}
 
 
 def _plain(value: Any) -> Any:

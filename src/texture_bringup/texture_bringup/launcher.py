@@ -19,7 +19,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, TypeVar
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
@@ -40,31 +40,22 @@ from texture_core.config import (
 from texture_core.errors import InvalidLaunch, LaunchFailed, TextureError
 
 # --------------------
-# A launcher as a child process of another program, which watches and ends it.
+# A sub-command as a child process of another program, which watches and ends it.
 
-STOP_DEADLINE_S = 15.0  # the launcher itself kills after 8 s
+ChildT = TypeVar('ChildT', bound='Child')
+STOP_DEADLINE_S = 30.0  # a launcher kills its nodes after 8 s, a recorder may be behind
 
 
-class ChildLauncher:
-    """Run `texture launch FILE …` as a child process; use it in a `with` block."""
+class Child:
+    """Run a sub-command of `texture`; use it in a `with` block."""
 
-    def __init__(
-        self,
-        file: str,
-        arguments: Mapping[str, object],
-        environment: Mapping[str, str],
-        log: Path,
-        *,
-        together: bool = True,
-    ) -> None:
+    def __init__(self, arguments: Sequence[str], environment: Mapping[str, str], log: Path) -> None:
         self.log = log
-        options = ['--parent', str(os.getpid()), *['--together'] * together]
-        given = [f'{name}:={value}' for name, value in arguments.items()]
-        self._command = [sys.executable, '-m', 'texture_bringup.command', 'launch', *options, file, *given]
+        self._command = [sys.executable, '-m', 'texture_bringup.command', *arguments]
         self._environment = environment
         self._process: subprocess.Popen[bytes] | None = None
 
-    def __enter__(self) -> ChildLauncher:
+    def __enter__(self: ChildT) -> ChildT:
         with self.log.open('wb') as log:
             self._process = subprocess.Popen(
                 self._command,
@@ -72,29 +63,44 @@ class ChildLauncher:
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=log,
-                start_new_session=True,  # Ctrl-C reaches this program only, which then stops the nodes in order
+                start_new_session=True,  # Ctrl-C reaches this program only, which then stops the child in order
             )
         return self
 
     def __exit__(self, *_: object) -> None:
         self.stop()
 
-    def check(self) -> None:
-        """Raise LaunchFailed, with the last line of the log, which names the cause, if the nodes have ended."""
-        if self._process is not None and self._process.poll() is not None:
-            last = self.log.read_text(errors='replace').rstrip().rpartition('\n')[2].removeprefix('[launch] ')
-            raise LaunchFailed(f'{last or "the launcher ended"}; the output of all nodes is in {self.log}')
+    @property
+    def end(self) -> str:
+        """The last line of the log, which names the cause, if the child has ended; else ''."""
+        if self._process is None or self._process.poll() is None:
+            return ''
+        last = self.log.read_text(errors='replace').rstrip().rpartition('\n')[2].removeprefix('[launch] ')
+        return last or 'it ended'
 
     def stop(self) -> None:
-        """Stop the nodes and wait until none is left."""
+        """Stop the child and wait until nothing of it is left."""
         if self._process is None:
             return
         self._process.send_signal(signal.SIGINT)
         try:
             self._process.wait(STOP_DEADLINE_S)
         except subprocess.TimeoutExpired:
-            self._process.kill()  # its nodes end with it
+            self._process.kill()  # nodes of a launcher end with it
             self._process.wait()
+
+
+class ChildLauncher(Child):
+    """Run `texture launch FILE …`, whose nodes end together."""
+
+    def __init__(self, file: str, arguments: Mapping[str, object], environment: Mapping[str, str], log: Path) -> None:
+        given = (f'{name}:={value}' for name, value in arguments.items())
+        super().__init__(['launch', '--parent', str(os.getpid()), file, *given], environment, log)
+
+    def check(self) -> None:
+        """Raise LaunchFailed if the nodes have ended."""
+        if self.end:
+            raise LaunchFailed(f'{self.end}; the output of all nodes is in {self.log}')
 
 
 # --------------------
@@ -438,28 +444,23 @@ def typed(text: str, type_name: str, where: str) -> Any:
 MAX_BYTES = 200_000  # of one file; the longest in use has 5 kB
 MAX_INCLUDES = 20  # of files within each other
 CONDITIONS = {'if': True, 'unless': False}
-NODE_TEXTS = (
-    'pkg',
-    'exec',
-    'name',
-    'namespace',
-    'respawn',
-    'respawn_delay',
-    'respawn_max_retries',
-    'on_exit',
-)
-# The attributes of each element, and the kinds of its child elements by their tag; None: any element.
-ALLOWED: Mapping[str, tuple[Collection[str], Mapping[str, str] | None]] = {
-    'launch': ((), None),
+RESPAWN = {'respawn': 'false', 'respawn_delay': '0', 'respawn_max_retries': '-1'}
+ELEMENTS = {tag: tag for tag in ('arg', 'let', 'set_env', 'push_ros_namespace', 'group', 'include', 'node')}
+# The attributes of each element, and the kinds of its child elements by their tag.
+ALLOWED: Mapping[str, tuple[Collection[str], Mapping[str, str]]] = {
+    'launch': ((), ELEMENTS),
     'arg': (('name', 'default', 'description', *CONDITIONS), {'choice': 'choice'}),
     'choice': (('value',), {}),
     'arg of an include': (('name', 'value'), {}),
     'let': (('name', 'value', *CONDITIONS), {}),
     'set_env': (('name', 'value', *CONDITIONS), {}),
     'push_ros_namespace': (('namespace', *CONDITIONS), {}),
-    'group': (CONDITIONS, None),
+    'group': (CONDITIONS, ELEMENTS),
     'include': (('file', *CONDITIONS), {'arg': 'arg of an include'}),
-    'node': ((*NODE_TEXTS, 'output', *CONDITIONS), {'param': 'param', 'remap': 'remap'}),  # all output is shown
+    'node': (  # all output is shown
+        ('pkg', 'exec', 'name', 'namespace', *RESPAWN, 'on_exit', 'output', *CONDITIONS),
+        {'param': 'param', 'remap': 'remap'},
+    ),
     'param': (('name', 'value', 'type', 'from'), {}),
     'remap': (('from', 'to'), {}),
 }
@@ -552,18 +553,10 @@ def _check_form(element: Element, kind: str) -> None:
     for name in element.attrib:
         if name not in attributes:
             raise unknown_name(name, attributes, f'attribute of <{element.tag}>')
-    if children is None:
-        return
     for child in element:
         if child.tag not in children:
             raise unknown_name(child.tag, children, f'element inside <{element.tag}>')
         _check_form(child, children[child.tag])
-
-
-def _attribute(element: Element, name: str) -> str:
-    if name not in element.attrib:
-        raise InvalidLaunch(f"<{element.tag}> has no attribute '{name}'; give it one")
-    return element.attrib[name]
 
 
 class _Reader:
@@ -577,15 +570,6 @@ class _Reader:
         self.declared: set[str] = set()
         self._variables, self._environment, self._namespace = dict(variables), dict(environment), ''
         self._depth = 0
-        self._readers: Mapping[str, Callable[[Element], None]] = {
-            'arg': self._read_arg,
-            'let': self._read_let,
-            'set_env': self._read_set_env,
-            'push_ros_namespace': self._read_namespace,
-            'group': self._read_group,
-            'include': self._read_include,
-            'node': self._read_node,
-        }
 
     def read_file(self, path: Path) -> None:
         """Read a file; its nodes join those of other files."""
@@ -604,7 +588,9 @@ class _Reader:
 
     def text(self, element: Element, name: str) -> str:
         """Return an attribute with its substitutions performed."""
-        return expand(_attribute(element, name), self._perform)
+        if name not in element.attrib:
+            raise InvalidLaunch(f"<{element.tag}> has no attribute '{name}'; give it one")
+        return expand(element.attrib[name], self._perform)
 
     def _perform(self, name: str, arguments: Sequence[str]) -> str:
         """Return the value of one substitution; UnknownName or InvalidLaunch if it has none."""
@@ -631,21 +617,18 @@ class _Reader:
 
     def _read_children(self, parent: Element) -> None:
         for element in parent:
-            if element.tag not in self._readers:
-                raise unknown_name(element.tag, self._readers, 'launch element')
-            _check_form(element, element.tag)
-            conditions = [name for name in CONDITIONS if name in element.attrib]
             where = f'of <{element.tag}>'
+            conditions = [name for name in CONDITIONS if name in element.attrib]
             if all(typed(self.text(element, c), 'bool', f"'{c}' {where}") is CONDITIONS[c] for c in conditions):
-                self._readers[element.tag](element)
+                getattr(self, f'_read_{element.tag}')(element)
 
     def _read_arg(self, element: Element) -> None:
-        name = _attribute(element, 'name')
+        name = self.text(element, 'name')
         if name not in self._variables:
             if 'default' not in element.attrib:
                 raise InvalidLaunch(f"argument '{name}' is required; give {name}:=VALUE")
             self._variables[name] = self.text(element, 'default')
-        value, choices = self._variables[name], [_attribute(choice, 'value') for choice in element]
+        value, choices = self._variables[name], [self.text(choice, 'value') for choice in element]
         if choices and value not in choices:
             raise InvalidLaunch(f"argument '{name}' is '{value}'; allowed is one of {', '.join(choices)}")
 
@@ -655,7 +638,7 @@ class _Reader:
     def _read_set_env(self, element: Element) -> None:
         self._environment[self.text(element, 'name')] = self.text(element, 'value')
 
-    def _read_namespace(self, element: Element) -> None:
+    def _read_push_ros_namespace(self, element: Element) -> None:
         self._namespace = joined_namespace(self._namespace, self.text(element, 'namespace')) or '/'
 
     def _read_group(self, element: Element) -> None:
@@ -674,10 +657,15 @@ class _Reader:
         self.read_file(path)
 
     def _read_node(self, element: Element) -> None:
-        texts = {name: self.text(element, name) for name in NODE_TEXTS if name in element.attrib}
+        texts = {name: self.text(element, name) for name in element.attrib}
         if (on_exit := texts.get('on_exit', 'shutdown')) != 'shutdown':
             raise InvalidLaunch(f"'on_exit' of <node> is '{on_exit}'; allowed is shutdown")
         namespace = joined_namespace(self._namespace, texts.get('namespace', ''))
+        types = ('bool', 'float', 'int')
+        respawn, delay_s, retries = (
+            typed(texts.get(name, usual), kind, f"'{name}' of <node>")
+            for (name, usual), kind in zip(RESPAWN.items(), types, strict=True)
+        )
         self.nodes.append(
             NodeDescription(
                 package=self.text(element, 'pkg'),
@@ -686,11 +674,9 @@ class _Reader:
                 namespace=namespace or '/' * ('namespace' in texts),
                 parameters=tuple(self._parameter(item) for item in element.findall('param')),
                 remappings=tuple((self.text(item, 'from'), self.text(item, 'to')) for item in element.findall('remap')),
-                respawn=typed(texts.get('respawn', 'false'), 'bool', "'respawn' of <node>"),
-                respawn_delay_s=typed(texts.get('respawn_delay', '0'), 'float', "'respawn_delay' of <node>"),
-                respawn_max_retries=typed(
-                    texts.get('respawn_max_retries', '-1'), 'int', "'respawn_max_retries' of <node>"
-                ),
+                respawn=respawn,
+                respawn_delay_s=delay_s,
+                respawn_max_retries=retries,
                 needed='on_exit' in texts,
                 environment=dict(self._environment),
             )

@@ -8,7 +8,6 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from types import TracebackType
 from typing import Any
 from uuid import uuid4
 
@@ -40,16 +39,7 @@ from texture_core.errors import (
     MotionAborted,
     TextureError,
 )
-from texture_core.ros import (
-    FEATURE_QOS,
-    LEVELS,
-    SENSOR_QOS,
-    STATE_QOS,
-    from_msg,
-    has_ended,
-    quality_of_service,
-    to_msg,
-)
+from texture_core.ros import FEATURE_QOS, LEVELS, SENSOR_QOS, STATE_QOS, from_msg, has_ended, quality_of_service, to_msg
 from texture_core.types import ExplorationRequest, ExplorationState, FeatureVector, RoughnessEstimate, TextureEstimate
 
 
@@ -121,7 +111,6 @@ FEATURES_DEADLINE_S = 30.0
 # An explorer that explores sends feedback, and else its idle state once a second: silent for this long, it has ended or
 # hangs. ROS lists a killed one for another 20 s.
 GONE_S = 4.0
-LISTEN_S = 0.5  # without feedback, until its state is subscribed to
 # Time until a goal is accepted: it is short, unless the request has been lost with an explorer that just died.
 ACCEPT_S = 15.0
 # Time to find a service, and time for its answer: an arm needs seconds to recover, a tare up to 65 s.
@@ -183,15 +172,13 @@ class Operator:
         self._explore = ActionClient(self._node, action.Explore, 'explore')
         self._settings: dict[str, AsyncParameterClient] = {}  # of each node, made once: all nodes remember it
         self._heard_s = 0.0  # of the explorer
-        self._states: Any = None  # not subscribed yet
+        self._states: Any = None  # not subscribed yet: who waits for listeners would count it
         self._vectors: list[FeatureVector] | None = None  # not subscribed yet
 
     def __enter__(self) -> Operator:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._explore.destroy()
         self._executor.shutdown()
         self._node.destroy_node()
@@ -241,6 +228,8 @@ class Operator:
             self._heard_s = time.monotonic()
             on_progress(from_msg(message.feedback.state), from_msg(message.feedback.texture))
 
+        hear = (msg.ExplorationState, 'exploration', self._hear, STATE_QOS)
+        self._states = self._states or self._node.create_subscription(*hear, raw=True)
         goal_id = GoalInfo().goal_id
         goal_id.uuid = list(uuid4().bytes)
         accepted = self._explore.send_goal_async(action.Explore.Goal(request=to_msg(request)), on_feedback, goal_id)
@@ -262,10 +251,7 @@ class Operator:
         try:
             while not any(ending.done() for ending in endings) and (now_s := time.monotonic()) < deadline_s:
                 self._step()
-                silent_s = now_s - self._heard_s
-                if silent_s > LISTEN_S:
-                    self._listen_to_states()
-                if silent_s > GONE_S:
+                if now_s - self._heard_s > GONE_S:
                     raise MotionAborted(VANISHED)
                 if now_s - asked_s > RETRY_PERIOD_S:  # a restarted explorer answers that the goal is unknown
                     endings.append(goal.get_result_async())
@@ -315,7 +301,7 @@ class Operator:
         name = f"the service '{self._node.resolve_service_name(service)}'"
         missing = f'no node offers {name}; {advice}'
         silent = f'{name} does not answer; look at the robot, and at the output of its node'
-        answer = self._ask(Trigger, service, Trigger.Request(), (OFFERED_S, missing), (ANSWER_S, silent))
+        answer = self._ask(Trigger, service, Trigger.Request(), missing, silent)
         return bool(answer.success), str(answer.message)
 
     def set_active(self, node: str, active: bool) -> str:
@@ -323,14 +309,12 @@ class Operator:
         missing = f"no lifecycle node '{node}' answers; start it, or give its --namespace"
         silent = f"node '{node}' does not answer; look at its output"
         for _ in range(3):  # two transitions at most, and a look at the state behind them
-            state = self._ask(
-                GetState, f'{node}/get_state', GetState.Request(), (OFFERED_S, missing), (ANSWER_S, silent)
-            )
+            state = self._ask(GetState, f'{node}/get_state', GetState.Request(), missing, silent)
             label = str(state.current_state.label)
             if label not in STEPS[active]:
                 break
             request = ChangeState.Request(transition=Transition(id=STEPS[active][label]))
-            answer = self._ask(ChangeState, f'{node}/change_state', request, (OFFERED_S, missing), (ANSWER_S, silent))
+            answer = self._ask(ChangeState, f'{node}/change_state', request, missing, silent)
             if not answer.success:
                 raise LaunchFailed(f"node '{node}' is {label} and refuses to change; its output gives the reason")
         return label
@@ -366,8 +350,8 @@ class Operator:
         self._node.create_subscription(
             msg.FeatureVector, 'features', lambda message: vectors.append(from_msg(message)), FEATURE_QOS
         )
-        self._until(lambda: self._node.count_publishers('features') > 0, FEATURES_DEADLINE_S,
-                    "no node publishes on 'features'; is the feature_extractor running?")  # fmt: skip
+        missing = "no node publishes on 'features'; is the feature_extractor running?"
+        self._until(lambda: self._node.count_publishers('features') > 0, FEATURES_DEADLINE_S, missing)
         self._settle()
         return vectors
 
@@ -379,26 +363,21 @@ class Operator:
     def _ask_classifier(self, kind: Any, name: str, request: Any) -> Any:
         """Return the answer of a service of the classifier that succeeded."""
         missing, silent = 'no classifier answers; is it running?', 'the classifier does not answer; look at its output'
-        answer = self._ask(kind, name, request, (OFFERED_S, missing), (ANSWER_S, silent))
+        answer = self._ask(kind, name, request, missing, silent)
         if not answer.success if kind is Trigger else answer.error_code:
             raise InvalidData(answer.message)
         return answer
 
-    def _ask(self, kind: Any, name: str, request: Any, offered: tuple[float, str], answered: tuple[float, str]) -> Any:
-        """Return the answer of a service; each step has a timeout, s, and a message for it."""
+    def _ask(self, kind: Any, name: str, request: Any, missing: str, silent: str) -> Any:
+        """Return the answer of a service; the sentences are for one that nobody offers, and one without an answer."""
         client = self._node.create_client(kind, name)
         try:
-            self._until(client.service_is_ready, *offered)
+            self._until(client.service_is_ready, OFFERED_S, missing)
             future = client.call_async(request)
-            self._until(future.done, *answered)
+            self._until(future.done, ANSWER_S, silent)
         finally:
             self._node.destroy_client(client)
         return future.result()
-
-    def set_parameters(self, node: str, values: Mapping[str, Any]) -> None:
-        """Set parameters of a node."""
-        client = self._parameters_of(node)
-        self._set(node, client, [Parameter(name, value=value) for name, value in values.items()])
 
     def parameters(self, node: str, names: Sequence[str]) -> list[Any]:
         """Return the values of parameters of a node, in the order of their names."""
@@ -406,16 +385,20 @@ class Operator:
         answer = self._answer(node, client.get_parameters(list(names)))
         return [parameter_value_to_python(one) for one in answer.values]
 
-    def set_from_texts(self, node: str, texts: Mapping[str, str]) -> None:
-        """Set parameters of a node from texts, read as the types that it has declared; UnknownName with the nearest."""
+    def set_parameters(self, node: str, values: Mapping[str, Any]) -> None:
+        """Set parameters of a node; a text is read as the type that it has declared. UnknownName has the nearest."""
         client = self._parameters_of(node)
         known = self._answer(node, client.list_parameters([], 10)).result.names
-        for name in texts:
+        for name in values:
             if name not in known:
                 raise unknown_name(name, known, f'parameter of {node}')
-        values = self._answer(node, client.get_parameters(list(texts))).values
-        read = [parameter_from_text(*pair, one.type) for pair, one in zip(texts.items(), values, strict=True)]
-        self._set(node, client, read)
+        declared = self._answer(node, client.get_parameters(list(values))).values
+        read = [
+            parameter_from_text(name, str(values[name]), one.type) for name, one in zip(values, declared, strict=True)
+        ]
+        for parameter, outcome in zip(read, self._answer(node, client.set_parameters(read)).results, strict=True):
+            if not outcome.successful:
+                raise InvalidParameter(f"node '{node}' refused parameter '{parameter.name}': {outcome.reason}")
 
     def _parameters_of(self, node: str) -> AsyncParameterClient:
         if node not in self._settings:
@@ -431,27 +414,11 @@ class Operator:
         self._until(future.done, ANSWER_S, f"node '{node}' does not answer")
         return future.result()
 
-    def _set(self, node: str, client: AsyncParameterClient, parameters: Sequence[Parameter]) -> None:
-        answer = self._answer(node, client.set_parameters(list(parameters)))
-        for name, outcome in zip((one.name for one in parameters), answer.results, strict=True):
-            if not outcome.successful:
-                raise InvalidParameter(f"node '{node}' refused parameter '{name}': {outcome.reason}")
-
-    def _listen_to_states(self) -> None:
-        if self._states is None:
-            self._states = self._node.create_subscription(
-                msg.ExplorationState, 'exploration', self._on_state, STATE_QOS, raw=True
-            )
-
-    def _on_state(self, _data: bytes) -> None:
+    def _hear(self, _state: bytes) -> None:
         self._heard_s = time.monotonic()
 
     def _until(
-        self,
-        condition: Callable[[], bool],
-        deadline_s: float,
-        complaint: str,
-        error: type[TextureError] = LaunchFailed,
+        self, condition: Callable[[], bool], deadline_s: float, complaint: str, error: type[TextureError] = LaunchFailed
     ) -> None:
         deadline = time.monotonic() + deadline_s
         with task(f'waiting: {complaint}'):

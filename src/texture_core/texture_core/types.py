@@ -715,7 +715,7 @@ class FingerReceiver:
 
 
 def rotation_matrix(rotation_vector_rad: Sequence[float] | Array) -> Array:
-    """Return the matrix that turns by |r| about the axis r/|r| (Rodrigues' formula)."""
+    """Return the matrix that turns about a vector by its length (Rodrigues' formula)."""
     x, y, z = rotation_vector_rad
     angle = float(np.sqrt(x * x + y * y + z * z))
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
@@ -726,7 +726,7 @@ def rotation_matrix(rotation_vector_rad: Sequence[float] | Array) -> Array:
 
 
 def quaternion(rotation_vector_rad: Sequence[float] | Array) -> tuple[float, float, float, float]:
-    """Return the quaternion x, y, z, w of ROS that turns by |r| about the axis r/|r|."""
+    """Return the quaternion x, y, z, w of ROS that turns about a vector by its length."""
     vector = np.array(rotation_vector_rad, dtype=float)
     half = 0.5 * float(np.linalg.norm(vector))
     x, y, z = (0.5 * np.sinc(half / np.pi) * vector).tolist()  # sin(half)/|r| in a form that holds for 0

@@ -11,10 +11,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from texture_core.config import from_mapping
-from texture_core.errors import DeviceError, InvalidParameter
+from texture_core.errors import DeviceError
 from texture_core.framing import Frame, FrameDecoder, pack
-from texture_core.types import TactileSignal, lost_samples
+from texture_core.types import TactileSignal
 from texture_drivers.biotac import (
     ERROR_WORDS,
     LAYOUTS,
@@ -177,33 +176,6 @@ def test_each_sample_has_the_time_of_its_slot() -> None:
     assert signal.units == ('count',)
     assert (signal.sampling_rate_hz, static.sampling_rate_hz) == (2200.0, 100.0)
     assert signal.first_sample == 22 * static.first_sample
-
-
-def test_a_lost_frame_is_a_jump_of_22_samples() -> None:
-    frames = numbered(range(60), reply())
-    sensor = opened(FakeBridge([*frames[:40], None, None, *frames[42:]]))
-    topics = run(sensor, 60)
-    assert lost_samples(topics['signal']) == 44
-    assert lost_samples(topics['signal_static']) == 2
-    assert sensor.counts['lost'] == 44
-    assert sensor.counts['samples'] == sum(len(batch.samples) for batch in topics['signal'])
-
-
-def test_a_damaged_word_is_nan_in_its_channel_and_finger() -> None:
-    content = bytearray(reply(fingers=(100, 200)))
-    content[6 * 38 + 4] ^= 1  # slot 38 is PDC; the second finger
-    sensor = opened(FakeBridge(numbered(range(40), bytes(content), fingers=2)), fingers=(0, 1))
-    topics = run(sensor, 40)
-    first, second = topics['finger0/signal_static'][-1].samples[0], topics['finger1/signal_static'][-1].samples[0]
-    assert (first == 100).all()
-    assert np.flatnonzero(np.isnan(second)).tolist() == [2]
-    assert (topics['finger1/signal'][-1].samples == 200).all()
-    assert sensor.counts['damaged_words'] == len(topics['finger1/signal_static'])
-
-
-def test_a_sensor_has_at_most_five_fingers() -> None:
-    with pytest.raises(InvalidParameter, match='finger'):
-        from_mapping(SensorParams, {'finger': 5})
 
 
 def test_a_place_without_a_biotac_is_reported_and_sends_nothing() -> None:

@@ -61,29 +61,6 @@ def run(line, numbers, offset_ns=START, **how):
     return batches
 
 
-def test_samples_come_out_in_order_in_units_and_with_their_times():
-    line = line_of(stream())
-    batches = run(line, range(500))['signal']
-    samples = np.concatenate([batch.samples for batch in batches])
-    skipped = 5000 - len(samples)  # the clock settles for 0.1 s
-    assert 240 <= skipped <= 280
-    np.testing.assert_array_equal(samples[:, 0], 0.5 * np.arange(skipped, 5000) - 1.0)
-    np.testing.assert_array_equal(samples[:, 1], -0.5 * np.arange(skipped, 5000) - 1.0)
-    assert lost_samples(batches) == line.trackers[1].lost == 0
-    assert batches[0].first_sample == 0
-    assert batches[-1].stamp_ns == pytest.approx(START + 4990 / 2500 * SECOND, abs=1e6)
-    assert (batches[0].channels, batches[0].units, batches[0].frame_id) == (('a', 'b'), ('V', 'V'), 'tip')
-
-
-def test_a_lost_frame_makes_a_jump_of_exactly_its_samples():
-    line = line_of(stream())
-    batches = run(line, [n for n in range(200) if n not in (100, 101, 150)])['signal']
-    assert lost_samples(batches) == line.trackers[1].lost == 30
-    truth = [batch.samples[0, 0] * 2 + 2 for batch in batches]
-    indices = [batch.first_sample for batch in batches]
-    assert np.ptp(np.subtract(truth, indices)) == 0
-
-
 def test_frames_read_at_once_are_one_batch_and_are_split_where_samples_are_missing():
     line = line_of(stream())
     run(line, range(100))

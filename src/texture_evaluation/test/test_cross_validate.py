@@ -323,7 +323,7 @@ def cross_validation(recipe: str, *folds: list[bool]) -> CrossValidation:
             for number, one in enumerate(right, 1)
             for label in ['cork' if one else 'felt']
         }
-        made.append(FoldResult(str(fold), (), results, None, 0.0))
+        made.append(FoldResult(str(fold), (), results, None))
     return CrossValidation(recipe, ('cork', 'felt'), tuple(made))
 
 

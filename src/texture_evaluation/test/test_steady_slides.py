@@ -9,6 +9,7 @@ import pytest
 from texture_core.errors import InvalidData, UnknownName
 from texture_core.types import NANOSECONDS, Phase, lost_samples
 from texture_features.features.taxels import MeanSpatialBands
+from texture_features.windows import WindowBatch
 from texture_recordings.bags import read_bag
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.public_sets import IMPORTS, evenly
@@ -96,7 +97,7 @@ def test_a_slide_is_even_at_its_rate_and_covers_all_of_its_time(tmp_path: Path) 
     batches = [value for _, _, value in read_bag(bag, ('signal',))]
     assert lost_samples(batches) == 0
     assert (slide.rate_hz, len(slide.channels), len(slide.before)) == (320.0, 9, 0)
-    assert slide.distance_m == pytest.approx(0.06, abs=2e-4)
+    assert len(slide.samples) / slide.rate_hz * slide.speed_m_s == pytest.approx(0.06, abs=2e-4)
     assert slide.slide.exploration_id == 'texture07/speed020/force0.0'
 
 
@@ -121,7 +122,7 @@ def test_runs_of_a_fabric_are_numbered_by_direction_force_speed_and_repeat(tmp_p
 def test_speeding_up_is_contact_and_no_slide(tmp_path: Path) -> None:
     (canvas,) = import_fabricslide(make_fabricslide(tmp_path / 'in'), tmp_path / 'out', materials=['Canvas'])
     for slide in SlideDataset.from_bags([canvas]).samples('signal_static'):
-        assert slide.distance_m == pytest.approx(0.5, abs=2e-3)
+        assert len(slide.samples) / slide.rate_hz * slide.speed_m_s == pytest.approx(0.5, abs=2e-3)
         assert len(slide.before) / slide.rate_hz * slide.speed_m_s == pytest.approx(0.047, abs=2e-3)
 
 
@@ -160,7 +161,9 @@ def test_the_line_of_a_printed_grating_stands_at_one_over_its_pitch_at_every_spe
     (board,) = import_fabricslide(make_fabricslide(tmp_path / 'in'), tmp_path / 'out', materials=['Board10mm'])
     bands = MeanSpatialBands(bands=40, longest_m=0.05, shortest_m=2.5e-3, floor=1e-3)
     for slide in SlideDataset.from_bags([board]).samples('signal_static'):
-        highest = bands(slide.windows()).argmax(axis=-1)
+        highest = bands(
+            WindowBatch(slide.samples, slide.rate_hz, np.array(slide.speed_m_s), np.array(slide.force_n))
+        ).argmax(axis=-1)
         assert bands.edges_per_m[highest] == pytest.approx(1 / PITCH_M, rel=0.1)
 
 

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import asyncio
-import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
@@ -247,7 +246,6 @@ class FoldResult:
     trained_on: tuple[str, ...]
     results: Mapping[str, SlideResult]
     model: TextureModel
-    train_s: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -722,10 +720,8 @@ def _fold(
     recipe: Recipe, trained: LabelledFeatures, tested: LabelledFeatures, trained_on: AnyArray, name: str
 ) -> FoldResult:
     """Return what a fold gave."""
-    start = time.process_time()  # not the wall clock: other folds share the machine
     try:
         model = train(recipe, trained)
     except InvalidData as error:
         raise InvalidData(f"fold '{name}' cannot be trained: {error}; {SPLIT_ADVICE}") from error
-    taken_s = time.process_time() - start
-    return FoldResult(name, tuple(trained_on.tolist()), predict_slides(model, tested), model, taken_s)
+    return FoldResult(name, tuple(trained_on.tolist()), predict_slides(model, tested), model)

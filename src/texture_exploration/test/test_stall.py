@@ -3,12 +3,14 @@
 """A finger that does not move along the surface as commanded, and slides that are not what was asked for."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from texture_core.errors import MotionAborted
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.arm import ArmState
+from texture_exploration.arms.tool_state import ForceSample, PoseSample, RosControllersParams, ToolState
 from texture_exploration.touch import TouchParams
 from texture_exploration.watches import SlideWatch, StallWatch
 
@@ -49,6 +51,19 @@ def test_stamps_that_jump_by_50_ms_in_a_slide_are_no_speed(ahead_s):
         now_s = number * STEP_S
         stamp_s = 1.0 + now_s + ahead_s * (now_s > 0.5)
         watch.update(ArmState(round(stamp_s * 1e9), (SPEED_M_S * now_s, 0.0, 0.0), REST, 1.0), True)
+    assert watch.flaw() == ''
+
+
+def test_a_force_that_comes_later_than_the_place_is_no_speed():
+    watch, tool = SlideWatch(SPEED_M_S, 1.0, TouchParams()), ToolState(RosControllersParams())
+    for number in range(100):
+        now_ns, place_m = round((1.0 + number * STEP_S) * 1e9), SPEED_M_S * number * STEP_S
+        tool.take_pose(now_ns, PoseSample(now_ns, 'base', (place_m, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)))
+        age_ns = 30_000_000 * (number % 10 == 9)
+        if number % 10 not in (4, 5, 6, 7, 8):
+            sample = ForceSample(now_ns - age_ns, 'base', (0.0, 0.0, 1.0 + 1e-6 * number), age_ns)
+            tool.take_force(now_ns, sample, moving=True)
+        watch.update(replace(tool.state(''), force_n=1.0), True)
     assert watch.flaw() == ''
 
 

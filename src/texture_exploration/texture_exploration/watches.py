@@ -8,6 +8,7 @@ import math
 import statistics
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import replace
 
 from texture_core.errors import ExplorationError, MotionAborted
 from texture_exploration.arms.arm import ArmState
@@ -143,6 +144,8 @@ class SlideWatch:
 
     def update(self, arm: ArmState, constant: bool) -> bool:
         """Take a state; return whether it is within the tolerance of the request."""
+        if arm.place_ns:  # a force that is older than the place is no speed
+            arm = replace(arm, time_ns=arm.place_ns)
         last_ns = self._recent[-1].time_ns if self._recent else 0
         self._states += 1
         self._force_sum_n += arm.force_n

@@ -56,10 +56,7 @@ VALUES = [
     ('signal', signal()),
     ('exploration', ExplorationState(STAMP_NS, 'e1', 'linear_slide', Phase.SLIDE, 0.5, 0.1, 2.0, surface='cork')),
     ('features', FeatureVector(STAMP_NS, 'e1', 0.5, 0.1, ('f', 'g'), np.array([1.5, math.nan]), feature_set='abc')),
-    (
-        'texture',
-        TextureEstimate(STAMP_NS, 'e1', 'cork', Rejection.NOVEL, 0.9, (0.9, 0.1), True, ('cork',), 3, 0.7),
-    ),
+    ('texture', TextureEstimate(STAMP_NS, 'e1', 'cork', Rejection.NOVEL, 0.9, (0.9, 0.1), True, ('cork',), 3, 0.7)),
     ('roughness', RoughnessEstimate(STAMP_NS, 'e1', True, 3.5, 0.4)),
     ('model_info', ModelInfo(STAMP_NS, 'm', 3, ('cork', 'felt'), 'abc')),
 ]
@@ -146,7 +143,8 @@ def test_without_an_explorer_each_folder_of_signals_is_a_namespace(tmp_path: Pat
 
 def test_only_the_requested_stretch_is_read(tmp_path: Path) -> None:
     bag = write(tmp_path / 'bag', count=10)
-    assert [log_ns - STAMP_NS for _, log_ns, _ in read_bag(bag, start_ns=STAMP_NS + 3, stop_ns=STAMP_NS + 5)] == [3, 4]
+    read = read_named(bag, start_ns=STAMP_NS + 3, stop_ns=STAMP_NS + 5)
+    assert [message.log_ns - STAMP_NS for _, message in read] == [3, 4]
 
 
 def test_a_bag_is_never_overwritten(tmp_path: Path) -> None:

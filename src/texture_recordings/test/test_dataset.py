@@ -29,8 +29,7 @@ def write(path: Path, surfaces: list[str], start_s: int) -> Path:
 
 
 @pytest.mark.parametrize(
-    ('text', 'numbers'),
-    [('1-3', {1, 2, 3}), ('1,3,5-7', {1, 3, 5, 6, 7}), (' 4 ', {4}), ('2-2', {2}), ('', None)],
+    ('text', 'numbers'), [('1-3', {1, 2, 3}), ('1,3,5-7', {1, 3, 5, 6, 7}), (' 4 ', {4}), ('2-2', {2}), ('', None)]
 )
 def test_a_selection_names_numbers_and_ranges(text: str, numbers: set[int] | None) -> None:
     assert parse_selection(text) == numbers

@@ -90,10 +90,9 @@ PAUSE = {'slides': {'by': 'pause', 'min_s': 0.05}}
 BACK = r"row \d+, column 't': time goes back .*by: pause"
 CLOCKS: dict[str, tuple[Write, dict, Truth]] = {
     'bursts that lost rows': (
-        csv(bursts(3)[~LOST], X[~LOST]), {},
-        'in bursts of 1 to 3, so lost rows cannot be told; .* the rate is 99',
+        csv(bursts(3)[~LOST], X[~LOST]), {}, 'in bursts of 1 to 3, .*so lost rows cannot be told; .* the rate is 99',
     ),
-    'bursts of a buffer that is read at any time': (csv(UNEVEN, X), {}, 'in bursts of 2 to 3, so lost rows cannot'),
+    'bursts of a buffer that is read at any time': (csv(UNEVEN, X), {}, 'in bursts of 2 to 3, .*so lost rows cannot'),
     'bursts in disorder': (
         csv(bursts(3)[np.r_[0:100, 101, 100, 102:N]], X), {}, '2 of 600 rows, which come in bursts, are out of order',
     ),
@@ -108,7 +107,13 @@ CLOCKS: dict[str, tuple[Write, dict, Truth]] = {
         [('cork', np.insert(X, 300, [np.nan] * 7))],
     ),
     'a counter of 16 bits in ms': (csv((6e4 * T).astype(int) % 2**16, X), timed('ms'), 'rate of .* is 1.667 Hz'),
-    'a counter of 16 bits in us': (csv((1e6 * T).astype(int) % 2**16, X), timed('us'), CORK),
+    'a counter of 16 bits in us': (
+        csv((1e6 * T).astype(int) % 2**16, X), timed('us'), 'rolls over every 0.0655 s, in which lost samples and a',
+    ),
+    'a counter of 16 bits in us at 15 Hz': (
+        csv((1e6 * T / 0.15).astype(int) % 2**16, X), timed('us'), 'rolls over every 0.0655 s, in which lost samples',
+    ),
+    'seconds of the minute by pause': (csv((T + 57) % 60, X), PAUSE, 'every 60 s, in which a run that is'),
     'a counter of 32 bits in us': (csv(((1e6 * T).astype(int) + 2**32 - 10**6) % 2**32, X), timed('us'), CORK),
     'a counter of 31 bits in ms': (csv(((1e3 * T).astype(int) + 2**31 - 5000) % 2**31, X), timed('ms'), CORK),
     'a counter of 32 bits in ns': (csv(((1e9 * T).astype(int) + 2**32 - 10**8) % 2**32, X), timed('ns'), CORK),
@@ -142,7 +147,7 @@ CLOCKS: dict[str, tuple[Write, dict, Truth]] = {
     'logs overlap by few rows': (csv(np.r_[T[:300], T[297:]], np.r_[X[:300], X[297:]]), {}, CORK),
     'logs overlap': (
         csv(np.r_[T[:300], T[200:]], np.r_[X[:300], X[200:]]), {'slides': {'by': 'pause'}},
-        'row 302, .*the rows from here on are those from row 202 on',
+        'row 302, .*time goes back to 2 s, into the run that began at 0 s; save each row once',
     ),
 }  # fmt: skip
 
@@ -244,10 +249,11 @@ def alternating(*names: Any) -> Write:
     return csv(np.repeat(T, count), samples, list(names) * N, names='t,x,sensor')
 
 
+ID = "row {}, column 'id': it changes"
 ROWS: dict[str, tuple[Write, dict, Truth]] = {
     **{
         f'sensors {names}': (
-            alternating(*names), {}, r"one value of 'sensor' after the other .*rows: \{sensor: ",
+            alternating(*names), {}, r"column 'sensor': it changes .* within a slide.*rows: \{sensor: ",
         )
         for names in (('S2', 'S1'), ('a', 'b', 'c'), (0, 1, 2, 3))
     },
@@ -259,9 +265,17 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
     ),
     'sensors at times of their own': (
         csv(np.ravel(np.c_[T, T + 0.005]).round(4), np.ravel(np.c_[X, Y]), ['a', 'b'] * N, names='t,x,id'), {},
-        r"one value of 'id' after the other \(a, b\).*rows: \{id: 'a'\}",
+        r"'id': it changes from 'a' to 'b' within a slide.*rows: \{id: 'a'\}",
     ),
-    'sensors without times': (csv(np.ravel(np.c_[X, Y]), [1, 2] * N, names='x,id'), RATE, "one value of 'id' after"),
+    'sensors without times': (csv(np.ravel(np.c_[X, Y]), [1, 2] * N, names='x,id'), RATE, ID.format(3)),
+    'sensors in blocks without times': (csv(X, np.repeat([1, 2], 300), names='x,id'), RATE, ID.format(302)),
+    'trials that no key uses': (csv(T, X, np.repeat(range(6), 100), names='t,x,trial'), {}, "'trial': it changes"),
+    'other columns': (
+        csv(T, X, np.arange(N) % 256, (20 * Y).astype(int), T.astype(str), names='t,x,n,adc,wall'), {}, CORK,
+    ),
+    'an index without a name': (
+        csv(range(N), X, names=',x'), {'streams': {'signal': {'columns': ['*'], 'rate_hz': 100.0}}}, CORK,
+    ),
     'a row of one signal': (
         csv(np.ravel(np.c_[X, Y]), [1, 2] * N, names='x,id'), {**RATE, 'rows': {'id': '*'}},
         [('cork', np.ravel(np.c_[X, Y]))],
@@ -349,13 +363,17 @@ CONTAINERS: dict[str, tuple[Write, dict, Truth]] = {
         records, {**ANY, 'streams': {'signal': {'columns': ['d.acc.*'], 'rate_hz': 100.0}}}, [('cork', np.c_[X, Y])],
     ),
     'parts that were never written': (h5(1000), {**ANY, **RATE}, 'has parts that were never written'),
-    'values with a scale': (h5(scale_factor=0.5, add_offset=3.0), {**ANY, **RATE}, [('cork', 0.5 * X + 3.0)]),
+    'values with a scale': (h5(scale_factor=0.5, add_offset=3.0), {**ANY, **RATE}, 'has the attribute add_offset'),
     'a WAV file that was cut': (wav(2 * N + 2000), SOUND, 'was cut off, .* declares 3200 bytes of sound and has 1200'),
     'a WAV file of a pipe': (wav(2**32 - 1), SOUND, 'or written to a pipe: it declares 4294967295 bytes'),
     'two sounds': (wav(2 * N, 2), SOUND, 'has 2 chunks of sound'),
     'trials as one slide': (
         npz(X=np.ones((20, 100, 3))), {**ANY, 'streams': {'signal': {'columns': ['X.*'], 'rate_hz': 100.0}}},
-        r'has trials; write slides: \{by: column, column: trial\}',
+        r'slides: \{by: column, column: trial\}',
+    ),
+    'many short trials as one slide': (
+        npz(X=np.random.default_rng(0).normal(size=(3000, 5, 2))),
+        {**ANY, 'streams': {'signal': {'columns': ['X.*'], 'rate_hz': 100.0}}}, "column 'trial': it changes from '0'",
     ),
     'a folder': (both(csv(T, X), lambda folder: (folder / 'felt_1.csv').mkdir()), {}, "'felt_1.csv' is a folder"),
 }  # fmt: skip
@@ -425,16 +443,16 @@ BAGS: dict[str, tuple[Write, Truth]] = {
     'a bag of ROS 1': (text('#ROSBAG V2.0', 'a_1.bag'), 'is a bag of ROS 1; convert it: rosbags-convert'),
     'a clock one hour ahead': (bag(3600.0), HALVES),
     'a clock that began at the start': (bag(-1.7e9 + 100.0), HALVES),
-    'sensors of two frames': (bag(frames=2), r"have the frames a, b.*rows: \{'/p/header.frame_id': 'a'\}"),
+    'sensors of two frames': (bag(frames=2), r"frame_id': it changes .*rows: \{/p/header.frame_id: 'a'\}"),
     'sound': (sound, 'is sound whose messages do not tell the format; give a WAV file'),
     'a clock that is faster': (bag(3600.0, 0.5), r"topic '/p': the stamps differ .* and that changes by 2\.\d+ s"),
     'empty metadata': (both(bag(), emptied), HALVES),
     'several files without metadata': (
         both(bag(), bag(name='b_1'), without('b_1/b_1.mcap', 'b_1/b_2.mcap'), without('b_1/metadata.yaml')),
-        "'b_1' holds b_1.mcap, b_2.mcap without metadata.yaml",
+        "'b_1' is a folder .* it holds b_1.mcap, b_2.mcap without metadata.yaml",
     ),
     'SQLite without metadata': (
-        both(bag(), bag(name='b_1', plugin=StoragePlugin.SQLITE3), without('b_1/metadata.yaml')), "'b_1' holds b_1.db3",
+        both(bag(), bag(name='b_1', plugin=StoragePlugin.SQLITE3), without('b_1/metadata.yaml')), "b_1.db3 without",
     ),
     'a file that is not listed': (both(bag(), without('a_1/a_1.mcap', 'a_1/a_2.mcap')), r'a_2\.mcap is not listed'),
 }  # fmt: skip
@@ -466,7 +484,7 @@ def arrays(folder: Path, first: str, second: str) -> None:
 @pytest.mark.parametrize(('first', 'second'), [('samples', 'channels'), ('channels', 'samples'), ('', '')])
 def test_arrays_of_two_dimensions_are_read_as_their_labels_name_them(tmp_path: Path, first: str, second: str) -> None:
     streams = {'signal': {'columns': ['/a/data.*']}}
-    truth: Truth = [('cork', np.c_[X, Y])] if first else "named '' and '', which does not tell samples"
+    truth: Truth = [('cork', np.c_[X, Y])] if first else "named '', '', which does not tell samples"
     check(
         tmp_path, lambda folder: arrays(folder, first, second), {'files': '{material}_{run}', 'streams': streams},
         truth, 'bag',
@@ -505,9 +523,9 @@ def h5_of_holes(folder: Path) -> None:
 
 
 SIZES: dict[str, tuple[Write, str]] = {
-    'cells': (mat(matlab(1, 400_000_000)), "'cork_1.mat' cannot be read"),
+    'cells': (mat(matlab(1, 400_000_000)), 'declares more than 8 million values'),
     'cells in a cell': (mat(matlab(1, 1, matlab(1, 400_000_000, name=b''))), "'cork_1.mat' cannot be read"),
-    'numbers': (mat(matlab(6, 2_000_000_000, element(9, bytes(80)))), "'cork_1.mat' cannot be read"),
+    'numbers': (mat(matlab(6, 2_000_000_000, element(9, bytes(80)))), 'declares more than 8 million values'),
     'no rows': (h5_without_rows, 'declares more than 8 million values'),
     'a header': (csv(names=','.join(f'x{number}' for number in range(20_000))), 'has 20000 columns; at most 10000'),
     'holes': (h5_of_holes, 'declares more than 8 million values'),

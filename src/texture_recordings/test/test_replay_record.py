@@ -130,11 +130,7 @@ def test_streams_of_other_names_transforms_and_logs_are_recorded_and_with_all_ev
     [
         ('replay', {}, "parameter 'bag' is ''"),
         ('replay', {'bag': 'nowhere'}, "there is no bag 'nowhere'"),
-        (
-            'replay',
-            {'bag': 'source', 'deadline_s': 0.2},
-            "nothing subscribes to 'signal' (waited 0.2 s)",
-        ),
+        ('replay', {'bag': 'source', 'deadline_s': 0.2}, "nothing subscribes to 'signal' (waited 0.2 s)"),
         ('replay', {'bag': 'source', 'slides': '7-9'}, 'there are 1 to 2'),
         ('record', {}, "parameter 'out' is ''"),
         ('record', {'out': 'source'}, 'exists already'),

@@ -13,9 +13,9 @@ import pytest
 import scipy.io
 from scipy.io import wavfile
 
-from texture_core.errors import InvalidData, MissingLibrary
+from texture_core.errors import InvalidData, MissingLibrary, UnknownName
 from texture_recordings.mapping import TableMapping, mapping_from, template_fields
-from texture_recordings.readers import MAPPED, TableFrame, frames
+from texture_recordings.readers import MAPPED, TableFrame, chosen, frames
 from texture_recordings.tables import import_tables
 
 pa = pytest.importorskip('pyarrow')
@@ -28,6 +28,9 @@ ARRAYS = {'x': X, 'y': Y}
 
 def mapping(**content: object) -> TableMapping:
     return mapping_from({'streams': {'signal': {'columns': ['x']}}, 'label': {'value': 'cork'}, **content})
+
+
+EVERYTHING = mapping(streams={'signal': {'columns': ['*'], 'rate_hz': 100.0}})
 
 
 def write_csv(path: Path) -> None:
@@ -71,13 +74,12 @@ each = pytest.mark.parametrize('suffix', MAPPED['table'])
 
 @each
 def test_columns_are_read_as_they_were_written(tmp_path: Path, suffix: str) -> None:
-    for table in frames(made(tmp_path, suffix), 'a', mapping()):
-        x, y = table.names[:2]
-        read = table.read([x, y], [x])
-    np.testing.assert_allclose(read.numbers[x], X, atol=1e-6)
-    np.testing.assert_allclose(read.numbers[y], Y, atol=1e-6)
-    assert read.texts[x].shape == X.shape
-    assert not read.reasons
+    [table] = tables(made(tmp_path, suffix), EVERYTHING)
+    x, y = list(table.columns)[:2]
+    np.testing.assert_allclose(table.numbers(x), X, atol=1e-6)
+    np.testing.assert_allclose(table.numbers(y), Y, atol=1e-6)
+    assert table.texts(x).shape == X.shape
+    assert not table.reasons
 
 
 @each
@@ -87,7 +89,7 @@ def test_a_file_that_is_something_else_is_refused_with_a_sentence_that_names_it(
     os.mkfifo(tmp_path / f'pipe{suffix}')
     for name in ('other', 'folder', 'pipe'):
         with pytest.raises(InvalidData, match=f"'{name}{suffix}'"):
-            [frame.read(frame.names[:1], []) for frame in tables(tmp_path / f'{name}{suffix}')]
+            tables(tmp_path / f'{name}{suffix}', EVERYTHING)
 
 
 @each
@@ -95,24 +97,23 @@ def test_a_damaged_file_is_read_or_refused(tmp_path: Path, suffix: str) -> None:
     content = made(tmp_path, suffix).read_bytes()
     rng = np.random.default_rng(0)
     path = tmp_path / f'damaged{suffix}'
-    everything = mapping(streams={'signal': {'columns': ['*'], 'rate_hz': 100.0}})
     for _ in range(60):
         data = bytearray(content[: int(rng.integers(1, len(content)))] if rng.random() < 0.3 else content)
         for place in rng.integers(0, len(data), rng.integers(1, 6)).tolist():
             data[place] = int(rng.integers(256))
         path.write_bytes(data)
         try:
-            import_tables(everything, path, None)
+            import_tables(EVERYTHING, path, None)
         except InvalidData as error:
             assert path.name in str(error)
 
 
 @each
 def test_a_column_that_is_missing_is_refused_with_the_nearest(tmp_path: Path, suffix: str) -> None:
-    table = tables(made(tmp_path, suffix))[0]
-    with pytest.raises(InvalidData, match="no column 'wrong'"):
-        table.chosen(['wrong'])
-    assert table.chosen(['*']) == list(table.names)
+    names = list(tables(made(tmp_path, suffix), EVERYTHING)[0].columns)
+    with pytest.raises(UnknownName, match="no column 'wrong'"):
+        chosen(['wrong'], names)
+    assert chosen(['*'], names) == names
 
 
 @pytest.mark.parametrize(('suffix', 'name'), [('.h5', 'h5py'), ('.parquet', 'pyarrow.parquet')])
@@ -136,15 +137,15 @@ def test_objects_in_arrays_are_refused_and_nothing_is_run(tmp_path: Path) -> Non
 def test_structs_of_matlab_are_folders_and_row_vectors_are_columns(tmp_path: Path) -> None:
     scipy.io.savemat(tmp_path / 'a.mat', {'run': {'acc': np.stack([X, Y], axis=1), 't': X[None], 'speed': 20.0}})
     [table] = tables(tmp_path / 'a.mat', mapping(tables='run'))
-    assert list(table.names) == ['acc.0', 'acc.1', 't']
-    assert table.fields['speed'] == '20.0'
+    assert list(table.columns) == ['acc.0', 'acc.1', 't', 'speed']
+    assert table.columns['speed'][()] == 20.0
 
 
 def test_arrays_of_a_form_are_a_table_each_with_what_their_names_hold(tmp_path: Path) -> None:
     arrays = {f'{name}/speed{speed}': np.stack([X, Y], axis=1) for name in ('cork', 'felt') for speed in (20, 40)}
     np.savez(tmp_path / 'a.npz', **arrays, notes=np.zeros(3))
     found = tables(tmp_path / 'a.npz', mapping(tables='{material}/speed{speed}'))
-    assert [table.fields for table in found][1] == {'material': 'cork', 'speed': '40'}
+    assert [str(found[1].columns[name]) for name in ('material', 'speed')] == ['cork', '40']
     assert len(found) == 4
     with pytest.raises(InvalidData, match=r"no array of the form 'run\{n\}'; it has cork"):
         tables(tmp_path / 'a.npz', mapping(tables='run{n}'))
@@ -157,7 +158,7 @@ def test_links_out_of_an_hdf5_file_are_not_followed(tmp_path: Path) -> None:
         file['y'] = Y
         file['x'] = h5py.ExternalLink('secret.h5', '/x')
     [table] = tables(tmp_path / 'a.h5')
-    assert list(table.names) == ['y']
+    assert list(table.columns) == ['y']
 
 
 @pytest.mark.parametrize(
@@ -171,17 +172,17 @@ def test_links_out_of_an_hdf5_file_are_not_followed(tmp_path: Path) -> None:
 )
 def test_text_files_of_several_kinds_are_read(tmp_path: Path, text: str, form: dict[str, object]) -> None:
     (tmp_path / 'a.csv').write_text(text, newline='')
-    [table] = tables(tmp_path / 'a.csv', mapping(format=form))
-    assert list(table.names) == (['0', '1'] if form.get('header') is False else ['a', 'b'])
-    assert table.read([table.names[0]], []).numbers[table.names[0]].tolist() == [1.5, 3.25]
+    every = {'signal': {'columns': ['*'], 'rate_hz': 100.0}}
+    [table] = tables(tmp_path / 'a.csv', mapping(format=form, streams=every))
+    assert list(table.columns) == (['0', '1'] if form.get('header') is False else ['a', 'b'])
+    assert next(iter(table.columns.values())).tolist() == [1.5, 3.25]
 
 
 def test_a_quote_that_is_never_closed_spoils_its_own_row_alone(tmp_path: Path) -> None:
     (tmp_path / 'a.csv').write_text('a,b\n1,2\n"3,4\n5,6\n')
-    [table] = tables(tmp_path / 'a.csv')
-    read = table.read(['a', 'b'], [])
-    assert list(read.reasons) == [3]
-    assert read.numbers['b'][[0, 2]].tolist() == [2, 6]
+    [table] = tables(tmp_path / 'a.csv', EVERYTHING)
+    assert np.flatnonzero(table.junk).tolist() == [1]
+    assert table.columns['b'][[0, 2]].tolist() == [2, 6]
 
 
 @pytest.mark.parametrize(

@@ -112,7 +112,7 @@ def test_losses_and_rows_whose_times_contradict_each_other_are_counted(tmp_path:
         ("['acc_*']", '[acc_x, acc_w]', r"v20.csv': no column 'acc_w'; did you mean 'acc_[xyz]'\?"),
         ('{column: t, unit: ms}', '{column: time, unit: ms}', "no column 'time'"),
         ('{column: t, unit: ms}', '{column: t, unit: s}\n    rate_hz: 100', '0.1 Hz by its times, 100 Hz are'),
-        ("['acc_*']", '[phase]', r"910 malformed rows of 910, first row 3, column 'phase': 'rest' is no"),
+        ("['acc_*']\n    channels: [x, y, z]", '[phase]', "910, first row 3, column 'phase': 'rest' is no"),
         ('[stroke 1, stroke 2, stroke 3]', '[stroke]', "column 'phase' has none of the values stroke; it has rest"),
         ('{column: material}', '{column: materiel}', "no column 'materiel'; did you mean 'material'"),
         ('.csv', '.dat', "has the form '{day}, {material}, v{speed}.dat'"),
@@ -225,12 +225,13 @@ def test_an_order_of_axes_that_does_not_fit_is_refused(tmp_path: Path) -> None:
 
 
 def test_slides_that_are_too_short_are_counted(tmp_path: Path) -> None:
-    mapping = one_channel(slides={'by': 'column', 'column': 'k', 'min_s': 0.5})
+    by = {'by': 'column', 'column': 'k'}
+    mapping = one_channel(slides={**by, 'min_s': 0.5})
     save(tmp_path, x=np.arange(150.0), k=np.repeat([1, 2, 3], [60, 20, 70]))
     report = import_tables(mapping, tmp_path / 'in', tmp_path / 'out')
     assert (sum(report.slides.values()), report.left_out['slides are too short']) == (2, 1)
     with pytest.raises(InvalidData, match='no slide of 5 s or more'):
-        import_tables(one_channel(slides={'min_s': 5.0}), tmp_path / 'in', tmp_path / 'none')
+        import_tables(one_channel(slides={**by, 'min_s': 5.0}), tmp_path / 'in', tmp_path / 'none')
 
 
 START_NS = 1_700_000_000 * NANOSECONDS

@@ -136,42 +136,11 @@ class CheckedPath(type(Path())):  # type: ignore[misc]
         if whole:
             return file
         logging.getLogger(__name__).warning("'%s' was cut off; it is read up to its last whole chunk", self)
-        return io.BufferedReader(_Ended(file, end))
+        return io.BytesIO(file.read(end) + END)
 
     def read_text(self, encoding: str | None = None, errors: str | None = None) -> str:
         """Return the text of a short file."""
         return read_text(self, MAX_METADATA_BYTES, encoding or 'utf-8')
-
-
-class _Ended(io.RawIOBase):
-    """The first bytes of a file, and the end that it lacks."""
-
-    def __init__(self, file: BinaryIO, length: int) -> None:
-        self._file, self._length, self._at = file, length, 0
-
-    def readable(self) -> bool:
-        return True
-
-    def seekable(self) -> bool:
-        return True
-
-    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        self._at = offset + {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: self._length + len(END)}[whence]
-        return self._at
-
-    def readinto(self, buffer: Any) -> int:
-        if self._at < self._length:
-            self._file.seek(self._at)
-            part = self._file.read(min(len(buffer), self._length - self._at))
-        else:
-            part = END[self._at - self._length :][: len(buffer)]
-        buffer[: len(part)] = part
-        self._at += len(part)
-        return len(part)
-
-    def close(self) -> None:
-        self._file.close()
-        super().close()
 
 
 def _has_end(file: BinaryIO) -> bool:
@@ -420,24 +389,20 @@ def read_named(
 
 
 def read_bag(
-    path: str | Path,
-    topics: Iterable[str] | None = None,
-    namespace: str | None = None,
-    start_ns: int | None = None,
-    stop_ns: int | None = None,
+    path: str | Path, topics: Iterable[str] | None = None, namespace: str | None = None
 ) -> Iterator[tuple[str, int, Any]]:
     """Yield (topic, log time in ns, data class of texture_core) in the order of log times.
 
     Only messages of the suite are read. Topics are named as below their namespace, 'signal' for '/left/signal' and
     'finger0/signal' for the first of several fingers, in `topics` as in the answer; samples are views of the bytes
-    read. The other arguments are those of `read_named`.
+    read.
     """
     wanted = None if topics is None else set(topics)
 
     def chosen(connection: Connection, name: str) -> bool:
         return connection.msgtype in MESSAGES and (wanted is None or name in wanted)
 
-    for name, message in _read(Path(path), chosen, namespace, start_ns, stop_ns):
+    for name, message in _read(Path(path), chosen, namespace):
         try:
             value = decode(message.data, message.msgtype)
         except InvalidData as error:
@@ -453,23 +418,23 @@ def topics_in(path: str | Path, namespace: str | None = None) -> list[str]:
         names.update([name] if connection.msgtype in MESSAGES else [])
         return False
 
-    for _ in _read(Path(path), note, namespace, None, None):
+    for _ in _read(Path(path), note, namespace):
         pass  # no connection is chosen, so no message comes: `note` has seen them all
     return sorted(names)
 
 
 def read_foreign(path: str | Path, chosen: Callable[[Connection], bool]) -> Iterator[RawMessage]:
     """Yield messages of a bag that the suite did not record, undecoded, in the order of their log times."""
-    found = _read(Path(path), lambda connection, name: chosen(connection), None, None, None, foreign=True)
+    found = _read(Path(path), lambda connection, name: chosen(connection), foreign=True)
     return (message for _, message in found)
 
 
 def _read(
     path: Path,
     chosen: Callable[[Connection, str], bool],
-    namespace: str | None,
-    start_ns: int | None,
-    stop_ns: int | None,
+    namespace: str | None = None,
+    start_ns: int | None = None,
+    stop_ns: int | None = None,
     *,
     foreign: bool = False,
 ) -> Iterator[tuple[str, RawMessage]]:

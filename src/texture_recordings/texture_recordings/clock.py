@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The clock of rows: their rate, and the place of each on a grid of it, or a fault where times contradict."""
+"""The clock of rows: their rate, and the place of each on an even grid, or a fault where times contradict it."""
 
 from __future__ import annotations
 
-import math
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -14,18 +14,18 @@ from texture_core.types import AnyArray, Array
 SIGNIFICANT = 4  # digits of an estimated rate: the resolution of time stamps allows no more
 ROUND_RATE = 1e-3  # a rate that is so near to one of two digits is taken for that one
 GAP = 1.5  # steps of time longer than so many sampling intervals are gaps, whose samples count as lost
-CLEAR = 0.25  # intervals between the longest step without a loss and the shortest with one
 SAME_TIME = 0.1  # rows nearer than this share of an interval have one time
-BURST_RATIO, BURST_DUTY, BURST_SHARE, LONGEST_BURST_S = 5.0, 0.25, 0.2, 1.0
-MIN_BURSTS = 4
-MODULI = (
-    *(2.0**bits / unit for bits in (16, 24, 31, 32) for unit in (1.0, 1e3, 1e6, 1e9)),
-    *(86_400.0 * unit for unit in (1.0, 1e3, 1e6, 1e9)),  # times of the day pass midnight
-)
+COARSE = 0.45  # intervals: of a clock that counts in longer steps, rounding looks like losses
+NEAR = 11  # rows that have one median
+OFF_GRID = 0.45  # intervals by which rows may be off the grid where samples are lost, or their median elsewhere
+MOST_OFF, MOST_OFF_SHARE = 3.0, 0.003  # intervals, and share of the rows of a slide, where none is
+BURST_DUTY, MIN_BURSTS, LONGEST_BURST_S = 0.1, 4, 1.0
+# Counters of 16 to 32 bits, and times of the day, s. In a shorter period, losses and slower rates would be unseen.
+PERIODS = (*(2.0**bits * unit for bits in (16, 24, 31, 32) for unit in (1e-9, 1e-6, 1e-3, 1.0)), 86_400.0)
+SHORTEST_PERIOD_S = 1.0
+MINUTE_AND_HOUR = (60.0, 3600.0)
 SAME_RATE = 1.05  # the rate of another file may differ by this factor
-MOST_OFF, MOST_OFF_SHARE = 3.0, 0.003  # samples, and share of those of a slide, by which rows may be off an even grid
 MAX_LEFT_OUT = 0.1  # share of the rows
-TIMES = '; look at the column of time, its unit and `slides` in the mapping'
 WITHOUT_TIME = 'if no sample is lost, give `rate_hz` in place of the column of time'
 
 
@@ -37,57 +37,64 @@ class ClockFault(ValueError):
         self.row = row
 
 
-def unwrapped(times: Array) -> Array:
-    """Return times of a counter that rolls over at 2^16, 2^24, 2^31 or 2^32 of some unit, or a day, without jumps."""
+def _period_s(times: Array, periods: Sequence[float]) -> float:
+    """Return the period of a clock that rolls over, s; 0 if its steps back are none of a roll."""
     steps = np.diff(times)
     back, forward = steps[steps < 0], steps[steps > 0]
     if not len(back) or not len(forward):
-        return times
-    for modulus in MODULI:
-        usual = float(forward[forward < modulus / 2].mean()) if (forward < modulus / 2).any() else math.inf
-        far = back[back < -modulus / 2] + modulus
-        near = usual * (20.0 if modulus > 1000 * usual else 1.75)
-        if times.max() < modulus and times.min() >= 0 and len(far) and (far > 0).all() and (far <= near).all():
-            whole = np.asarray(np.unwrap(times, period=modulus))
-            # Rows in disorder next to a roll may hide another one.
-            return whole if (np.diff(whole) >= 0).all() else times
-    return times
-
-
-def burst_step_s(steps: Array) -> float:
-    """Return the step of time that begins a burst of rows that were stamped at once, as of a buffer; 0 without."""
-    ordered = np.sort(steps[steps >= 0])
-    total = float(ordered.sum())
-    if len(ordered) < 2 * MIN_BURSTS or not total > 0:
         return 0.0
-    floor = 1e-6 * total / len(ordered)
-    ratios = np.maximum(ordered[1:], floor) / np.maximum(ordered[:-1], floor)
-    place = int(ratios.argmax()) + 1
-    small, large = ordered[:place], ordered[place:]
-    if ratios[place - 1] < BURST_RATIO or len(small) < BURST_SHARE * len(ordered) or len(large) < MIN_BURSTS:
+    for period in periods:
+        after = back + period
+        usual = forward[forward < period / 2].mean() if (forward < period / 2).any() else 0.0
+        near = max(1.75 * usual, min(20.0 * usual, period / 50.0))
+        if times.min() >= 0 and times.max() < period and (after > 0).all() and (after <= near).all():
+            return period
+    return 0.0
+
+
+def forward(times: Array, *, runs: bool) -> Array:
+    """Return times of a counter or of the day without its rolls; ClockFault where these hide losses, or may be runs."""
+    period_s = _period_s(times, (*PERIODS, *(MINUTE_AND_HOUR if runs else ())))
+    if period_s and (runs or period_s < SHORTEST_PERIOD_S):
+        hidden = f'lost samples and a slower rate cannot be seen; {WITHOUT_TIME}'
+        other = 'a run that is another slide looks alike; cut the slides by a column, or save times that grow'
+        raise ClockFault(
+            int(np.argmax(np.diff(times) < 0)) + 1,
+            f'the clock rolls over every {period_s:.3g} s, in which {other if runs else hidden}',
+        )
+    return np.asarray(np.unwrap(times, period=period_s)) if period_s else times
+
+
+def _burst_step_s(steps: Array) -> float:
+    """Return the least step between bursts of rows that a buffer stamped at once; 0 where steps are not bimodal."""
+    steps = steps[steps >= 0]
+    large = steps[steps > steps.mean()] if len(steps) else steps
+    if not MIN_BURSTS <= len(large) <= 0.6 * len(steps):
         return 0.0
     regular = np.median(large) <= LONGEST_BURST_S and np.quantile(large, 0.75) <= 3.0 * np.quantile(large, 0.25)
-    return float(large[0]) if regular and small.sum() < BURST_DUTY * total else 0.0
+    within = 1.0 - large.sum() / steps.sum()
+    return float(large.min()) if regular and within < BURST_DUTY else 0.0
 
 
-def estimated_rate_hz(times: Array, burst_s: float) -> float:
-    """Return the rate of rows in spite of jitter and gaps, of four digits; NaN without steps of time."""
-    starts, counts = _bursts(times, burst_s)
-    size, steps = np.median(counts) if burst_s else 1, np.diff(times[starts])
+def estimated(steps: Array) -> tuple[float, float]:
+    """Return the rate of rows in spite of jitter and gaps, of four digits, and the least step between bursts, s.
+
+    Both are 0 without such.
+    """
+    burst_s, size = _burst_step_s(steps), 1.0
+    if burst_s:  # the steps from burst to burst
+        ends = np.flatnonzero(steps >= burst_s)
+        size = float(np.median(np.diff(ends)))
+        steps = np.diff(np.cumsum(steps)[ends])
     steps = steps[steps > 0]
     # Without gaps and rows that are there twice.
     usual = steps[(steps < 1.75 * np.median(steps)) & (steps > 0.25 * np.median(steps))] if len(steps) else steps
     if not len(usual):
-        return math.nan
+        return 0.0, burst_s
     rate_hz = float(size / usual.mean())
     simple = float(f'{rate_hz:.2g}')
-    return simple if abs(rate_hz / simple - 1.0) < ROUND_RATE else float(f'{rate_hz:.{SIGNIFICANT}g}')
-
-
-def _bursts(times: Array, burst_s: float) -> tuple[AnyArray, AnyArray]:
-    """Return the first row of each burst and its number of rows."""
-    starts = np.flatnonzero(np.concatenate(([True], np.diff(times) >= burst_s)))
-    return starts, np.diff(np.append(starts, len(times)))
+    near = abs(rate_hz / simple - 1.0) < ROUND_RATE
+    return simple if near else float(f'{rate_hz:.{SIGNIFICANT}g}'), burst_s
 
 
 def on_grid(
@@ -95,62 +102,54 @@ def on_grid(
 ) -> tuple[AnyArray, AnyArray, Counter[str]]:
     """Return which rows of a slide are samples, (n,), the place of each on a grid, and counts of what is left out.
 
-    Jitter of the times is that of the host that stamped them, and not of the device that sampled. ClockFault where the
-    times contradict the rate, go back, or lack more samples than there are.
+    ClockFault where times contradict the rate, go back, or lack more samples than there are.
     """
+    count, steps = len(times), np.diff(times)
+    left: Counter[str] = Counter()
+    rows: AnyArray = np.arange(count)
     # Rows that are there once more are none; those of a buffer have one time, and may have one value.
-    fresh: AnyArray = np.ones(len(times), dtype=bool)
-    if not burst_s and (np.diff(times) <= 0).any():
+    if not burst_s and (steps <= 0).any():
         _, first = np.unique(np.column_stack([times, samples]), axis=0, return_index=True, equal_nan=True)
-        fresh = np.isin(np.arange(len(times)), first)
-    rows = np.flatnonzero(fresh)
+        rows = np.sort(first)
+        left['repeated rows'] = count - len(rows)
     # Of rows that contradict each other by their times nobody knows which one is wrong.
     behind = times[rows] < np.maximum.accumulate(times[rows])
     ahead = times[rows] > np.minimum.accumulate(times[rows][::-1])[::-1]
-    rows, out = rows[~behind & ~ahead], int((behind | ahead).sum())
-    left_out = {'repeated rows': int((~fresh).sum()), 'rows out of order': out}
-    if out > MAX_LEFT_OUT * len(times) or (out and burst_s):
-        row = int(np.argmax(np.diff(times) < 0)) + 1
+    out = left['rows out of order'] = int((behind | ahead).sum())
+    rows = rows[~behind & ~ahead]
+    if out > MAX_LEFT_OUT * count or (out and burst_s):
+        row = int(np.argmax(steps < 0)) + 1
         bursts = ', which come in bursts,' if burst_s else ''
         raise ClockFault(
-            row, f'time goes back from {times[row - 1]:.9g} to {times[row]:.9g} s, and {out} of {len(times)} rows'
-            f'{bursts} are out of order; where the file holds several runs, write slides: {{by: pause}}, or cut them '
-            f'by a column; a counter is only unwrapped at 2^16, 2^24, 2^31 or 2^32; {WITHOUT_TIME}',
+            row, f'time goes back from {times[row - 1]:.9g} to {times[row]:.9g} s, and {out} of {count} rows{bursts} '
+            'are out of order; where the file holds several runs, write slides: {by: pause}, or cut them by a column; '
+            f'a counter is only unwrapped at 2^16, 2^24, 2^31 or 2^32; {WITHOUT_TIME}',
         )  # fmt: skip
     if burst_s:
-        rows, index = _burst_places(times, samples, rate_hz, burst_s, stated=stated)
-        left_out['rows of incomplete bursts'] = len(times) - len(rows)
+        rows = index = _in_bursts(times, samples, burst_s)
+        left['rows of incomplete bursts'] = count - len(rows)
     else:
         index = _places(times[rows], rows, rate_hz, out, stated=stated)
     # Of a row or two behind a gap at an end nobody knows whether the gap or their time is wrong.
-    apart = np.flatnonzero(np.diff(index) > 1)
-    low = max((place + 1 for place in apart[apart < 2]), default=0)
-    high = min((place + 1 for place in apart[apart >= len(index) - 3]), default=len(index))
-    if high - low < len(index) and high > low:
-        left_out['rows alone at the end of a slide'] = len(index) - (high - low)
+    gaps = np.flatnonzero(np.diff(index) > 1)
+    low = max((gap + 1 for gap in gaps if gap < 2), default=0)
+    high = min((gap + 1 for gap in gaps if gap >= len(index) - 3), default=len(index))
+    if low < high:
+        left['rows alone at the end of a slide'] = len(index) - (high - low)
         rows, index = rows[low:high], index[low:high]
-    if len(times) - len(rows) > MAX_LEFT_OUT * len(times):
+    if count - len(rows) > MAX_LEFT_OUT * count:
         raise ClockFault(
-            int(rows[0]), f'{len(times) - len(rows)} of {len(times)} rows have the time of another one or come in '
-            f'incomplete bursts; filter them (`rows: {{column: value}}`); {WITHOUT_TIME}',
+            0, f'{count - len(rows)} of {count} rows have the time of another one or come in incomplete bursts; filter '
+            f'them (`rows: {{column: value}}`); {WITHOUT_TIME}',
         )  # fmt: skip
-    # The grid must agree with the clock as a whole, and everywhere.
-    lost, seconds = int(index[-1] - index[0] + 1 - len(index)), float(times[rows[-1]] - times[rows[0]])
-    burst_rows = 2.0 * burst_s * rate_hz
-    if lost > len(rows) or abs(index[-1] - index[0] - seconds * rate_hz) > MOST_OFF + 0.03 * len(index) + burst_rows:
+    lost = int(index[-1] - index[0] + 1 - len(index))
+    if lost > len(rows):
         raise ClockFault(
-            0, f'{len(rows)} rows and {lost} lost samples at {rate_hz:g} Hz take other than the {seconds:.4g} s of '
-            f'their times, which are too irregular; by rows and duration the rate is '
-            f'{len(rows) / max(seconds, 1e-9):.4g} Hz{TIMES}, or give `rate_hz` in place of the column of time',
+            0, f'{len(rows)} rows and {lost} lost samples at {rate_hz:g} Hz: more are lost than there are; by rows and '
+            f'duration the rate is {_mean_hz(times[rows]):.4g} Hz; look at the column of time and its unit; '
+            f'{WITHOUT_TIME}',
         )  # fmt: skip
-    off = np.abs(_rest(times[rows], index))
-    if off.max(initial=0.0) > MOST_OFF + MOST_OFF_SHARE * len(index) + burst_rows:
-        raise ClockFault(
-            int(rows[off.argmax()]), f'the rate changes within a slide: by {rate_hz:g} Hz this row is '
-            f'{off.max():.3g} samples off; cut the slides where it changes, and give each rate a mapping',
-        )  # fmt: skip
-    counts = {'samples': len(index), 'lost': lost, **{reason: count for reason, count in left_out.items() if count}}
-    return rows, index - index[0], Counter(counts)
+    return rows, index - index[0], Counter({'samples': len(index), 'lost': lost}) + left
 
 
 def _places(times: Array, rows: AnyArray, rate_hz: float, out: int, *, stated: bool) -> AnyArray:
@@ -160,62 +159,58 @@ def _places(times: Array, rows: AnyArray, rate_hz: float, out: int, *, stated: b
     if len(unlike):
         raise ClockFault(
             int(rows[unlike[0]]), f'{len(unlike)} times come twice with other values: of a coarse clock, or of several '
-            'sensors; choose rows (`rows: {column: value}`), or give `rate_hz` in place of the column of time',
+            f'sensors; choose rows (`rows: {{column: value}}`); {WITHOUT_TIME}',
         )  # fmt: skip
     # A late row is followed by a short step, an early one comes after one, a loss is not.
     pairs = np.minimum(steps + np.append(steps[1:], np.inf), steps + np.append(np.inf, steps[:-1])[: len(steps)])
     missing = np.where((steps > GAP) & (pairs > 1.0 + GAP), np.rint(steps) - 1, 0).astype(np.int64)
     index = np.concatenate(([0], np.cumsum(1 + missing)))
     # Where the clock counts in steps of about an interval, its rounding looks like losses.
-    exact = stated and np.abs(steps - np.rint(steps)).max(initial=0.0) < 0.02
     tick_s = _tick_s(times)
-    if missing.sum() > out and tick_s * rate_hz > 0.45 and not exact:
+    exact = stated and np.abs(steps - np.rint(steps)).max(initial=0.0) < 0.02
+    if missing.sum() > out and tick_s * rate_hz > COARSE and not exact:
         raise ClockFault(
-            0, f'time counts in steps of {tick_s:g} s at {rate_hz:g} Hz, so lost '
-            f'samples cannot be told from rounding; give `rate_hz` next to the column of time, or {WITHOUT_TIME}',
+            0, f'time counts in steps of {tick_s:g} s at {rate_hz:g} Hz, so lost samples cannot be told from rounding; '
+            f'give `rate_hz` next to the column of time, or {WITHOUT_TIME}',
         )  # fmt: skip
-    # Behind a loss the rows lie on the grid that those before it had; behind some late rows they come back by one.
+    # The rate must hold as a whole; where samples are lost each row must lie on the grid, elsewhere none may shift.
     lag = _rest(times, index)
-    for row in np.flatnonzero(missing).tolist():
-        if abs(np.median(lag[row + 1 : row + 6]) - np.median(lag[max(0, row - 4) : row + 1])) > 0.5:
-            raise ClockFault(
-                int(rows[row + 1]), f'a gap of {steps[row]:.3g} samples at {rate_hz:g} Hz contradicts the times '
-                f'around it, so lost samples cannot be told from late rows; by rows and duration the rate is '
-                f'{len(times) / max(times[-1] - times[0], 1e-9):.4g} Hz; {WITHOUT_TIME}',
-            )  # fmt: skip
-    # Losses are those that stand out: whole steps, and longer than any that is none.
-    large = missing > 0
-    if large.any() and (
-        np.abs(steps[large] - np.rint(steps[large])).mean() > 0.2
-        or steps[large].min() - steps[~large].max(initial=1.0) < CLEAR + (0.0 if exact else tick_s * rate_hz)
-    ):
+    if np.abs(lag).max() > MOST_OFF + MOST_OFF_SHARE * len(index):
+        row = int(np.abs(lag).argmax())
         raise ClockFault(
-            0, f'the steps of time are too irregular for a rate of {rate_hz:g} Hz: losses cannot be told from '
-            f'jitter, and by rows and duration it is '
-            f'{len(times) / max(times[-1] - times[0], 1e-9):.4g} Hz; give `rate_hz` in place of the column of time',
+            int(rows[row]), f'the rate changes within a slide: by {rate_hz:g} Hz this row is {abs(lag[row]):.3g} '
+            'samples off; cut the slides where it changes, and give each rate a mapping',
+        )  # fmt: skip
+    off = np.abs(lag) if missing.any() else _shifts(lag)
+    if off.max(initial=0.0) > OFF_GRID:
+        raise ClockFault(
+            int(rows[off.argmax()]), f'the steps of time are too irregular for a rate of {rate_hz:g} Hz: about this '
+            f'row they are {off.max():.2g} samples off the grid, so losses cannot be told from jitter, and by rows and '
+            f'duration the rate is {_mean_hz(times):.4g} Hz; {WITHOUT_TIME}',
         )  # fmt: skip
     return index
 
 
-def _burst_places(
-    times: Array, samples: AnyArray, rate_hz: float, burst_s: float, *, stated: bool
-) -> tuple[AnyArray, AnyArray]:
-    """Return which rows are in whole bursts, and the place of each on the grid, (n,) each."""
-    starts, counts = _bursts(times, burst_s)
+def _in_bursts(times: Array, samples: AnyArray, burst_s: float) -> AnyArray:
+    """Return the rows of whole bursts, (n,): of one size and an even distance, one comes after the other."""
     inside = np.diff(times) < burst_s
+    starts = np.flatnonzero(np.append(True, ~inside))
+    counts = np.diff(np.append(starts, len(times)))
     if np.all(samples[1:] == samples[:-1], axis=1)[inside].mean() > 0.5 and np.any(samples != samples[0]):
         raise ClockFault(1, 'most rows are there twice, with one time and the same values; save each row once')
     # Nobody knows which row a burst of another size lacks; a slide may begin and end within one.
-    size = int(np.median(counts))
-    if (counts[1:-1] != size).any() or size not in counts:
+    size, steps = int(np.median(counts)), np.diff(times[starts[1:]])
+    if (counts[1:-1] != size).any() or (len(steps) and steps.max() > GAP * np.median(steps)):
         raise ClockFault(
-            0, f'rows come in bursts of {counts.min()} to {counts.max()}, so lost rows cannot be told; by rows and '
-            f'duration the rate is {len(times) / max(times[-1] - times[0], 1e-9):.4g} Hz; {WITHOUT_TIME}',
+            0, f'rows come in bursts of {counts.min()} to {counts.max()}, every {steps.min():.3g} to {steps.max():.3g} '
+            f's, so lost rows cannot be told; by rows and duration the rate is {_mean_hz(times):.4g} Hz; '
+            f'{WITHOUT_TIME}',
         )  # fmt: skip
-    whole = counts == size
-    index = _places(times[starts[whole]], starts[whole], rate_hz / size, 0, stated=stated)
-    rows = np.add.outer(starts[whole], np.arange(size)).ravel()
-    return rows, np.add.outer(size * index, np.arange(size)).ravel()
+    return np.flatnonzero(np.repeat(counts == size, counts))
+
+
+def _mean_hz(times: Array) -> float:
+    return float(len(times) / max(times[-1] - times[0], 1e-9))
 
 
 def _rest(times: Array, numbers: AnyArray) -> Array:
@@ -224,6 +219,14 @@ def _rest(times: Array, numbers: AnyArray) -> Array:
     if len(times) < 3 or not np.ptp(since) > 0:
         return np.zeros(len(times))
     return np.asarray(numbers - np.polyval(np.polyfit(since, numbers.astype(float), 1), since))
+
+
+def _shifts(lag: Array) -> Array:
+    """Return how far apart the medians of the rows before and behind are, (n,): a loss among late rows is a step."""
+    if len(lag) < 2 * NEAR:
+        return lag[:0]
+    medians = np.median(np.lib.stride_tricks.sliding_window_view(lag, NEAR), axis=1)
+    return np.asarray(np.abs(medians[NEAR:] - medians[:-NEAR]))
 
 
 def _tick_s(times: Array) -> float:
@@ -236,16 +239,14 @@ def _tick_s(times: Array) -> float:
     return max(decimal, binary)
 
 
-def with_places(times: Array, kept: AnyArray) -> Array:
+def with_malformed(times: Array, kept: AnyArray) -> Array:
     """Return times in which malformed rows that stand for a sample, as the step around them shows, have its time."""
-    known = np.flatnonzero(np.isfinite(times))
-    steps = np.diff(times[kept & np.isfinite(times)])
-    usual = float(np.median(steps)) if len(steps) else 0.0
-    gaps = np.flatnonzero(kept & np.isnan(times))
-    gaps = gaps[(gaps > known[0]) & (gaps < known[-1])] if usual > 0 else gaps[:0]
-    after = np.searchsorted(known, gaps)
-    count, step = np.diff(known)[after - 1], np.diff(times[known])[after - 1]
-    one = np.abs(step / usual - count) < 0.5 if usual > 0 else gaps > 0
-    filled = times.copy()
-    filled[gaps[one]] = (times[known[after - 1]] + step * (gaps - known[after - 1]) / count)[one]
-    return filled
+    at = np.flatnonzero(np.isfinite(times) & kept)
+    if len(at) < 2:
+        return times
+    rows, count, step = np.arange(len(times)), np.diff(at), np.diff(times[at])
+    usual = np.median(step)
+    fits = np.abs(step - count * usual) < 0.5 * usual
+    between = fits[np.clip(np.searchsorted(at, rows) - 1, 0, len(fits) - 1)]
+    filled = np.interp(rows, at, times[at], np.nan, np.nan)
+    return np.where(np.isnan(times) & kept & between, filled, times)

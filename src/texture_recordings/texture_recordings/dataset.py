@@ -92,11 +92,7 @@ class SlideDataset:
 
     @classmethod
     def from_bags(
-        cls,
-        bags: Iterable[str | Path],
-        slides: str = '',
-        namespace: str | None = None,
-        topics: Sequence[str] = STREAMS,
+        cls, bags: Iterable[str | Path], slides: str = '', namespace: str | None = None, topics: Sequence[str] = STREAMS
     ) -> SlideDataset:
         """Read the labelled slides of bags with their signals; see `find_slides` for the arguments and errors.
 

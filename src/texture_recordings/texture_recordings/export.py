@@ -16,9 +16,9 @@ from texture_core.config import library, writing
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.types import AnyArray
 from texture_recordings.dataset import SlideDataset
+from texture_recordings.mapping import CONDITION_COLUMNS
 from texture_recordings.slides import STREAMS, SlideSamples
 
-CONDITION_COLUMNS = {'speed': 'speed_m_s', 'force': 'force_n', 'direction': 'direction_rad'}
 FACTS = ('slide', 'surface', 'number', 'session', *CONDITION_COLUMNS.values(), 'time_s')
 
 

@@ -165,7 +165,8 @@ class Quantity:
     unit: str = param('', "Unit of the number; '' is the SI unit.")
 
 
-# Factor to the SI unit, by the name of the condition.
+# Where a state holds a condition, and factors of its units to that of SI.
+CONDITION_COLUMNS = {'speed': 'speed_m_s', 'force': 'force_n', 'direction': 'direction_rad'}
 CONDITION_UNITS: Mapping[str, Mapping[str, float]] = {
     'speed': {'m/s': 1.0, 'cm/s': 1e-2, 'mm/s': 1e-3, 'mm/min': 1e-3 / 60.0},
     'force': {'N': 1.0, 'mN': 1e-3, 'gf': 9.80665e-3, 'kgf': 9.80665},

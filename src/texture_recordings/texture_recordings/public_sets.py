@@ -217,11 +217,7 @@ class SlideSet:
     motion: str = 'linear_slide'
 
     def __call__(
-        self,
-        source: str | Path,
-        out: str | Path,
-        slides: str = '',
-        materials: Sequence[str] = (),
+        self, source: str | Path, out: str | Path, slides: str = '', materials: Sequence[str] = ()
     ) -> list[Path]:
         """Write the bags, and return their paths."""
         arrays, wanted = self._read(Path(source)), parse_selection(slides)

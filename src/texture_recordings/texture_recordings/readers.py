@@ -12,20 +12,17 @@ import math
 import re
 import struct
 import warnings
-import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from collections.abc import Set as AbstractSet
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import partial
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from texture_core.config import MB, Arrays, library, open_regular, read_array, unknown_name
-from texture_core.errors import InvalidData, MissingLibrary
+from texture_core.errors import InvalidData, TextureError, UnknownName
 from texture_core.types import MAX_HZ, NANOSECONDS, AnyArray, Array
 from texture_recordings.bags import is_bag, message_types, read_foreign
 from texture_recordings.mapping import FileFormat, TableMapping, template_fields
@@ -38,102 +35,111 @@ MAX_RANGE = 10_000
 TRIAL = 'trial'  # number of the first axis of arrays (n_trials, n_samples, n_channels)
 MAX_ARRAYS = 50_000  # data sets of an HDF5 file
 MAX_CHANNELS = 10_000  # more are samples: the array lies on its side
-DELIMITERS = (',', ';', '\t', '|', ' ')
-BLOCK_ROWS = 20_000  # of a text file, which are parsed at once
 MAX_TEXT = 200  # characters of a cell that is shown or a label
 
 Take = Callable[[float], None]  # asks for a number of values; InvalidData beyond the limit of the file
 
 
 @dataclass(frozen=True, eq=False)
-class Columns:
-    """Columns of a frame, (n,) each: numbers, NaN where there is none, and texts."""
-
-    numbers: Mapping[str, Array]
-    texts: Mapping[str, AnyArray]
-    lines: AnyArray | None = None  # number in the file of each row
-    junk: AnyArray | None = None  # rows with something that is no number
-    reasons: Mapping[int, str] = field(default_factory=dict)  # of the first such rows, by line
-
-
-@dataclass(frozen=True, eq=False)
 class TableFrame:
-    """Columns that belong together, by name, with what holds for all their rows."""
+    """Columns that belong together, by name: (n,) numbers or texts, or () for what holds for all rows."""
 
     place: str
-    names: Sequence[str]
-    read: Callable[..., Columns]  # takes names of numbers and of texts, and how many of the first rows; all by default
-    fields: Mapping[str, str] = field(default_factory=dict)
+    columns: Mapping[str, AnyArray]
     rate_hz: float = 0.0
     clocks: Mapping[str, str] = field(default_factory=dict)  # column → column of its times, s
+    lines: AnyArray | None = None  # number in the file of each row
+    junk: AnyArray | None = None  # rows with something that is no number
+    reasons: Sequence[str] = ()  # of the first such rows
 
-    def chosen(self, wanted: Sequence[str]) -> list[str]:
-        """Return the columns that names, patterns such as 'taxel*' and ranges such as '0-8' mean, in their order."""
-        known = frozenset(self.names)
-        found = []
-        for name in wanted:
-            meant = [name] if name in known else _meant(name, self.names)
-            for one in meant or [name]:
-                if one not in known:
-                    raise InvalidData(f"'{self.place}': {unknown_name(one, self.names, 'column')}")
-            found += meant
-        return found
+    def __getitem__(self, name: str) -> AnyArray:
+        """Return a column; UnknownName with the nearest if there is none."""
+        if name not in self.columns:
+            raise unknown_name(name, self.columns, 'column')
+        return self.columns[name]
+
+    def numbers(self, name: str) -> Array:
+        """Return a column as numbers, NaN where there is none."""
+        array = self[name]
+        if array.dtype.kind in 'biuf':
+            return np.where(np.isfinite(array), array, np.nan).astype(np.float64)
+        if array.dtype.kind not in 'OUS':
+            raise InvalidData(f"column '{name}' holds {array.dtype}; numbers are needed, name another")
+        return np.array([number_of(text) for text in self.texts(name).ravel().tolist()]).reshape(array.shape)
+
+    def texts(self, name: str) -> AnyArray:
+        """Return a column as texts, '' where there is none; 3.0 is meant as 3."""
+        array = self[name]
+        if array.dtype.kind == 'S':
+            array = np.char.decode(array, 'utf-8', 'replace')
+        elif array.dtype.kind == 'f':
+            known = np.isfinite(array)
+            whole = np.array_equal(array[known], np.round(array[known]))
+            array = np.where(known, np.where(known, array, 0.0).astype(np.int64 if whole else float).astype(str), '')
+        return array if array.dtype.kind == 'O' else array.astype(str).astype(object)
 
 
-def _meant(name: str, names: Sequence[str]) -> list[str]:
-    match = RANGE.fullmatch(name)
-    if match and 0 <= int(match[3]) - int(match[2]) < MAX_RANGE:
-        return [f'{match[1]}{number}' for number in range(int(match[2]), int(match[3]) + 1)]
-    return [one for one in names if fnmatch.fnmatchcase(one, name)] if len(name) <= 100 else []
+def chosen(wanted: Sequence[str], names: Sequence[str]) -> list[str]:
+    """Return the columns that names, patterns such as 'taxel*' and ranges such as '0-8' mean, in their order."""
+    found = []
+    for name in wanted:
+        match = RANGE.fullmatch(name)
+        meant = [name]
+        if name not in names and match and 0 <= int(match[3]) - int(match[2]) < MAX_RANGE:
+            meant = [f'{match[1]}{number}' for number in range(int(match[2]), int(match[3]) + 1)]
+        elif name not in names and len(name) <= 100:
+            meant = [one for one in names if one and fnmatch.fnmatchcase(one, name)] or [name]
+        if unknown := [one for one in meant if one not in names]:
+            raise unknown_name(unknown[0], names, 'column')
+        found += meant
+    return found
+
+
+@contextmanager
+def placed(place: str) -> Iterator[None]:
+    """Begin the sentence of what is refused within a `with` block with its place."""
+    try:
+        yield
+    except (InvalidData, UnknownName) as error:
+        sentence = str(error)
+        between = ' ' if sentence.startswith('it ') else ', ' if sentence.startswith('row ') else ': '
+        raise InvalidData(f"'{place}'{between}{sentence.removeprefix('it ')}") from error
 
 
 def frames(path: Path, place: str, mapping: TableMapping) -> Iterator[TableFrame]:
     """Yield the frames of a file; InvalidData with its place, whatever is wrong with it."""
-    kind = kind_of(path)
-    if kind in OTHER_KINDS:
-        raise InvalidData(f"'{place}' {OTHER_KINDS[kind]}")
-    with _reading(place):
-        if path.is_dir():
-            size = sum(one.stat().st_size for one in path.iterdir() if one.is_file())
-        else:
-            with open_regular(path, MAX_FILE_BYTES) as file:
-                size = file.seek(0, io.SEEK_END)
-        left = float(max(MAX_VALUES, size))
+    with placed(place):
+        if kind_of(path) in OTHER_KINDS:
+            raise InvalidData(OTHER_KINDS[kind_of(path)])
+        try:
+            if path.is_dir():
+                size = sum(one.stat().st_size for one in path.iterdir() if one.is_file())
+            else:
+                with open_regular(path, MAX_FILE_BYTES) as file:
+                    size = file.seek(0, io.SEEK_END)
+            taken, most = 0.0, max(MAX_VALUES, size)
 
-        def take(count: float) -> None:
-            nonlocal left
-            left -= count
-            if left < 0:
-                most = max(MAX_VALUES, size)
-                raise InvalidData(
-                    f"'{place}' declares more than {most / 1e6:.0f} million values in {size / MB:.3g} MB; at most that "
-                    'many are read, split it or save what the mapping needs'
-                )
+            def take(count: float) -> None:
+                nonlocal taken
+                taken += count
+                if taken > most:
+                    raise InvalidData(
+                        f'it declares more than {most / 1e6:.0f} million values in {size / MB:.3g} MB; at most that '
+                        'many are read, split it or save what the mapping needs'
+                    )
 
-        for frame in READERS[kind](path, place, mapping, take):
-            yield replace(frame, read=partial(_guarded, frame.read, place))
-
-
-@contextmanager
-def _reading(place: str) -> Iterator[None]:
-    """Refuse a file whatever a library raises, which depends on the byte that is wrong."""
-    try:
-        yield
-    except (InvalidData, MissingLibrary):
-        raise
-    except Exception as error:
-        reason = (str(error) or type(error).__name__)[:300]
-        raise InvalidData(f"'{place}' cannot be read: {reason}; save it again") from error
-
-
-def _guarded(read: Callable[..., Columns], place: str, *wanted: Any) -> Columns:
-    with _reading(place):
-        return read(*wanted)
+            yield from READERS[kind_of(path)](path, place, mapping, take)
+        except TextureError:
+            raise
+        except Exception as error:  # whatever a library raises, which depends on the byte that is wrong
+            reason = (str(error) or type(error).__name__)[:300]
+            raise InvalidData(f'it cannot be read: {reason}; save it again') from error
 
 
 # ---- text files
 
-Line = tuple[int, str]  # its number in the file, from 1, and its text with the end of the line
+DELIMITERS = (',', ';', '\t', '|', ' ')
+BLOCK_ROWS = 20_000  # which are parsed at once
 NO_TEXT = frozenset(('nan', 'na', 'n/a', '#n/a', 'null'))  # 'none' may be a label
 BLANK = frozenset(('', 'nan', 'na', 'null', 'none'))
 THOUSANDS = re.compile(r'[+-]?[1-9]\d{0,2}(,\d{3})+')
@@ -141,97 +147,87 @@ NUMERIC = 0.9  # share of numbers in a column of numbers
 
 
 def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:
-    form = mapping.format
+    """Yield the columns of a text file: numbers where the mapping wants them or nine of ten cells are some, or texts.
+
+    A row is malformed if it has other cells than the first one, or a text in a column of numbers, used or not.
+    """
+    form, lines, parts = mapping.format, [], []
+    junk: list[AnyArray] = []
+    reasons: list[str] = []
     with open_regular(path) as opened:
-        _, first = next(_lines(opened, form), (0, ''))
-    form = replace(form, delimiter=form.delimiter or next((one for one in DELIMITERS if one in first), ','))
-    cells = _cells(first, form.delimiter)
-    if not first or '\0' in first:
-        raise InvalidData(f"'{place}' has no columns; give a text file in UTF-8 with a row for each sample")
-    names = cells if form.header else [str(number) for number in range(len(cells))]
-    if len(set(names)) < len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        raise InvalidData(f"'{place}' has the column '{twice}' twice; give each column a different name")
-    if len(names) > MAX_CHANNELS:
-        raise InvalidData(f"'{place}' has {len(names)} columns; at most {MAX_CHANNELS} are read, split it")
-    values = np.array([number_of(name) for name in names])
-    counted = all(name.isdigit() for name in names) and (np.diff(values) == 1).all()
-    if form.header and np.isfinite(values).all() and not counted:
+        # The names of the columns, and those that the mapping wants as numbers.
+        rest = _lines(opened, form)
+        first = next(rest, (0, ''))
+        rest = rest if form.header else chain([first], rest)
+        delimiter = form.delimiter or next((one for one in DELIMITERS if one in first[1]), ',')
+        names = _names(_cells(first[1], delimiter), form)
+        numbers = {name for one in mapping.streams.values() for name in chosen(one.columns, names)}
+        numbers |= {*mapping.numbers()}
+        numeric: dict[str, bool] = {}
+        # Block by block: the cells, what they are, and the rows that are malformed.
+        for block in iter(lambda: list(islice(rest, BLOCK_ROWS)), []):
+            take(len(block) * (len(names) + len(mapping.texts())))
+            rows = [_cells(line, delimiter) for _, line in block]
+            rows = [row[:-1] if len(row) == len(names) + 1 and not row[-1] else row for row in rows]
+            bad = {row: f"column 'all': {len(cells)} cells, {len(names)} are needed"
+                   for row, cells in enumerate(rows) if len(cells) != len(names)}  # fmt: skip
+            if not block[-1][1].endswith('\n'):
+                bad.setdefault(len(rows) - 1, "column 'all': the line has no end, so it may have been cut off")
+            whole = [[''] * len(names) if row in bad else cells for row, cells in enumerate(rows)]
+            part: dict[str, AnyArray] = {}
+            for name, cells in zip(names, zip(*whole, strict=True), strict=True):
+                text = name in mapping.texts()
+                if not text or name in numbers:
+                    points = [_with_point(cell) for cell in cells] if form.decimal == ',' else cells
+                    values = np.array([number_of(cell) for cell in points])
+                    text |= not numeric.setdefault(name, name in numbers or np.isfinite(values).mean() > NUMERIC)
+                for row in np.flatnonzero(np.isnan(values)).tolist() if numeric.get(name) else ():
+                    if cells[row].lower() not in BLANK:
+                        bad.setdefault(row, _reason(name, cells[row], form))
+                if not text:
+                    _refuse_commas(name, cells, form, delimiter)
+                part[name] = _texts(cells) if text else values
+            for row in bad:
+                if {*rows[row]} & {*names}:
+                    raise InvalidData(
+                        f'row {block[row][0]}: the names of the columns come again, {", ".join(rows[row][:5])}, so '
+                        'another recording may begin there; split the file there'
+                    )
+            reasons += [f'row {block[row][0]}, {bad[row]}' for row in sorted(bad)[: EXAMPLES - len(reasons)]]
+            lines.append(np.array([number for number, _ in block]))
+            junk.append(np.isin(np.arange(len(rows)), list(bad)))
+            parts.append(part)
+    if not parts:
+        raise InvalidData('it has no rows below the names of its columns; choose files with samples')
+    columns = {name: np.concatenate([part[name] for part in parts]) for name in names}
+    marked = np.concatenate(junk)
+    # A malformed row without a number is none of a sample: no border is seen there.
+    floats = [column for column in columns.values() if column.dtype.kind == 'f']
+    gone = marked & np.logical_and.reduce([np.isnan(column) for column in floats])
+    last = np.maximum.accumulate(np.where(gone, np.argmin(gone), np.arange(len(gone))))
+    columns = {name: column[last] if column.dtype.kind == 'O' else column for name, column in columns.items()}
+    yield TableFrame(place, columns, lines=np.concatenate(lines), junk=marked, reasons=reasons)
+
+
+def _names(cells: Sequence[str], form: FileFormat) -> list[str]:
+    """Return the names of the columns by the first row."""
+    if not cells or '\0' in cells[0]:
+        raise InvalidData('it has no columns; give a text file in UTF-8 with a row for each sample')
+    if len(cells) > MAX_CHANNELS:
+        raise InvalidData(f'it has {len(cells)} columns; at most {MAX_CHANNELS} are read, split it')
+    if not form.header:
+        return [str(number) for number in range(len(cells))]
+    twice = [name for name in cells if cells.count(name) > 1]
+    if twice:
+        raise InvalidData(f"it has the column '{twice[0]}' twice; give each column a different name")
+    values = np.array([number_of(name) for name in cells])
+    counted = all(name.isdigit() for name in cells) and (np.diff(values) == 1).all()
+    if np.isfinite(values).all() and not counted:
         raise InvalidData(
-            f"'{place}': the first row is {', '.join(names[:3])[:60]}, which are numbers and no names; write "
+            f'the first row is {", ".join(cells[:3])[:60]}, which are numbers and no names; write '
             'format: {header: false}, or skip fewer rows'
         )
-    yield TableFrame(place, names, partial(_csv_columns, path, place, form, names, take))
-
-
-def _csv_columns(  # noqa: PLR0917 – bound one after the other
-    path: Path, place: str, form: FileFormat, names: Sequence[str], take: Take,
-    numbers: Sequence[str], texts: Sequence[str], most: int | None = None,
-) -> Columns:  # fmt: skip
-    numeric = [name for name in names if name not in texts]
-    blocks: list[dict[str, AnyArray]] = []
-    reasons: dict[int, str] = {}
-    with open_regular(path) as opened:
-        lines = islice(_lines(opened, form), int(form.header), None if most is None else most + form.header)
-        while block := list(islice(lines, BLOCK_ROWS)):
-            take(len(block) * (len(numbers) + 2 * len(texts)))
-            cells = [_cells(line, form.delimiter) for _, line in block]
-            cells = [row[:-1] if len(row) == len(names) + 1 and not row[-1] else row for row in cells]
-            whole = np.array([len(row) == len(names) for row in cells])
-            whole[-1] &= block[-1][1].endswith('\n')  # or the row may have been cut off
-            rows = [row if good else [''] * len(names) for row, good in zip(cells, whole.tolist(), strict=True)]
-            columns = dict(zip(names, zip(*rows, strict=True), strict=True))
-            _refuse_commas(columns, numbers, form, place)
-            parsed = {name: _parsed(columns[name], form.decimal) for name in {*numeric, *numbers}}
-            if not blocks:
-                numeric = [name for name in numeric if np.isfinite(parsed[name]).mean() > NUMERIC]
-            # A row is malformed if it has other cells than the first one, or a text for a number that is wanted.
-            junk, odd = ~whole, ~whole
-            found = {
-                row: f"column 'all': {len(cells[row])} cells, {len(names)} are needed"
-                if len(cells[row]) != len(names)
-                else "column 'all': the line has no end, so it may have been cut off"
-                for row in np.flatnonzero(junk)[:EXAMPLES].tolist()
-            }
-            for name, values in parsed.items():
-                for row in np.flatnonzero(np.isnan(values)).tolist():
-                    cell = columns[name][row]
-                    if cell.lower() in BLANK:
-                        continue
-                    odd[row] |= name in numeric
-                    if name in numbers:
-                        junk[row] = True
-                        if len(found) < 2 * EXAMPLES:
-                            found.setdefault(row, _reason(name, cell, form))
-            reasons |= {block[row][0]: reason for row, reason in sorted(found.items())[: EXAMPLES - len(reasons)]}
-            # A row without any number, such as units that a logger wrote again, is none of a sample: its texts are none
-            # of a sample, too, and a slide must not end at them.
-            empty = junk & np.logical_and.reduce([np.isnan(parsed[name]) for name in numbers])
-            for row in np.flatnonzero(empty).tolist():
-                if len({*names} & {*cells[row]}) > 0.3 * len(names):
-                    raise InvalidData(
-                        f"'{place}', row {block[row][0]}: the names of the columns come again, "
-                        f'{", ".join(cells[row][:5])}, so another recording may begin there; split the file there'
-                    )
-            cleaned = {name: [_text(cell) for cell in columns[name]] for name in texts}
-            blocks.append({
-                'line': np.array([number for number, _ in block]), 'junk': junk, 'odd': odd, 'empty': empty,
-                **{f'number {name}': parsed[name] for name in numbers},
-                **{f'text {name}': np.array(cells, dtype=str) for name, cells in cleaned.items()},
-            })  # fmt: skip
-    if not blocks:
-        raise InvalidData(f"'{place}' has no rows below the names of its columns; choose files with samples")
-    all_rows = {key: np.concatenate([read[key] for read in blocks]) for key in blocks[0]}
-    # Units above the samples and sums below them have a text in a column of numbers, whether that is wanted or not.
-    odd, junk = all_rows['odd'], all_rows['junk']
-    outside = np.logical_and.accumulate(odd) | np.logical_and.accumulate(odd[::-1])[::-1]
-    for row in np.flatnonzero(outside & ~junk)[: EXAMPLES - len(reasons)].tolist():
-        reasons[int(all_rows['line'][row])] = 'a text in a column of numbers'
-    return Columns(
-        {name: np.where(outside, np.nan, all_rows[f'number {name}']) for name in numbers},
-        {name: _without_gaps(all_rows[f'text {name}'], all_rows['empty'] | outside) for name in texts},
-        all_rows['line'], junk | outside, reasons,
-    )  # fmt: skip
+    return list(cells)
 
 
 def _reason(name: str, cell: str, form: FileFormat) -> str:
@@ -240,34 +236,27 @@ def _reason(name: str, cell: str, form: FileFormat) -> str:
     return f"column '{name}': '{cell[:40]}' is not a finite number{hint}"
 
 
-def _refuse_commas(columns: Mapping[str, Sequence[str]], numbers: Sequence[str], form: FileFormat, place: str) -> None:
-    """Refuse commas that are decimal as well as delimiters, or that separate thousands where they are decimal."""
-    before: Sequence[str] = ()
-    for name, column in columns.items() if form.delimiter == ',' else ():
-        cells = [cell for cell in column if cell]
-        digits = len({*map(len, cells)}) == 1 and all(cell.isdigit() for cell in cells) and cells != sorted(cells)
-        whole = before and all(cell.lstrip('+-').isdigit() for cell in before)
-        if whole and digits and len(cells[0]) > 1 and any(cell[0] == '0' for cell in cells):
-            raise InvalidData(
-                f"'{place}': the column '{name}' holds digits such as {cells[0]}, so commas may be decimal as "
-                'well as between columns; save it with another delimiter'
-            )
-        before = column
-    for name in numbers if form.decimal == ',' else ():
-        commas = [cell for cell in columns[name] if ',' in cell]
-        if 0 < len(commas) < len(columns[name]) and all(THOUSANDS.fullmatch(cell) for cell in commas):
-            raise InvalidData(
-                f"'{place}', column '{name}': the comma of '{commas[0]}' seems to separate thousands; save numbers "
-                'without such commas'
-            )
+def _refuse_commas(name: str, cells: Sequence[str], form: FileFormat, delimiter: str) -> None:
+    """Refuse commas that may be decimal as well as delimiters, or that separate thousands where they are decimal."""
+    digits = (
+        [cell for cell in cells if cell]
+        if delimiter == ',' and all(cell.isdigit() or not cell for cell in cells)
+        else []
+    )
+    if any(len(cell) > 1 and cell[0] == '0' for cell in digits) and digits != sorted(digits):
+        raise InvalidData(
+            f"the column '{name}' holds digits such as {digits[0]}, so commas may be decimal as well as between "
+            'columns; save it with another delimiter'
+        )
+    commas = [cell for cell in cells if ',' in cell] if form.decimal == ',' else []
+    if 0 < len(commas) < len(cells) and all(THOUSANDS.fullmatch(cell) for cell in commas):
+        raise InvalidData(
+            f"column '{name}': the comma of '{commas[0]}' seems to separate thousands; save numbers without such commas"
+        )
 
 
-def _text(cell: str) -> str:
-    return '' if cell.lower() in NO_TEXT else cell[:MAX_TEXT]
-
-
-def _lines(opened: Any, form: FileFormat) -> Iterator[Line]:
-    """Yield the lines that are neither empty nor comments; what is no UTF-8 is read as Windows writes it ('m/s²')."""
+def _lines(opened: Any, form: FileFormat) -> Iterator[tuple[int, str]]:
+    """Yield number, from 1, and text of the lines that are neither empty nor comments; no UTF-8 is of Windows."""
     for number, raw in enumerate(opened, 1):
         try:
             line = raw.decode('utf-8-sig')
@@ -295,10 +284,12 @@ def _cells(line: str, delimiter: str) -> list[str]:
     return [cell.strip() for cell in cells]
 
 
-def _parsed(cells: Sequence[str], decimal: str) -> Array:
-    if decimal == ',':  # '1.234' may be a thousand
-        cells = ['?' if '.' in cell else cell.replace(',', '.') for cell in cells]
-    return np.array([number_of(cell) for cell in cells])
+def _with_point(cell: str) -> str:
+    return '?' if '.' in cell else cell.replace(',', '.')  # '1.234' may be a thousand
+
+
+def _texts(cells: Sequence[str]) -> AnyArray:
+    return np.array(['' if cell.lower() in NO_TEXT else cell[:MAX_TEXT] for cell in cells], dtype=object)
 
 
 def number_of(cell: str) -> float:
@@ -308,16 +299,6 @@ def number_of(cell: str) -> float:
     except ValueError:
         return math.nan
     return value if math.isfinite(value) else math.nan
-
-
-def _without_gaps(texts: AnyArray, gaps: AnyArray) -> AnyArray:
-    """Return texts in which a malformed row has the one before it: no border is seen there."""
-    if gaps.all():
-        return np.full(len(texts), '')
-    last = np.maximum.accumulate(np.where(gaps, -1, np.arange(len(texts))))
-    last[last < 0] = int(np.argmin(gaps))
-    filled: AnyArray = texts[last]
-    return filled
 
 
 # ---- files of arrays
@@ -334,56 +315,31 @@ def _read_numpy(path: Path, place: str, mapping: TableMapping, take: Take) -> It
 
 
 def _read_mat(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:
-    from scipy.io import loadmat  # noqa: PLC0415 – recording needs no scipy
+    from scipy.io import loadmat, whosmat  # noqa: PLC0415 – recording needs no scipy
 
     with open_regular(path) as opened:
         if opened.read(19).startswith(b'MATLAB 7.3 MAT-file'):  # HDF5 with all dimensions in reverse order
             yield from _read_hdf5(path, place, mapping, take, matlab=True)
             return
-        take(_unpacked_bytes(opened) / 8)
+        opened.seek(0)
+        take(sum(math.prod(shape) for _, shape, _ in whosmat(opened)))
         opened.seek(0)
         content = loadmat(opened, struct_as_record=True)
     arrays = dict(_members({name: value for name, value in content.items() if not name.startswith('__')}))
-    yield from _frames(tuple(arrays), arrays.__getitem__, place, mapping, lambda _: None)  # they are counted
-
-
-def _unpacked_bytes(file: Any) -> int:
-    """Return how many bytes the variables of a MATLAB file (version 5 to 7) unpack to, without keeping them."""
-    file.seek(124)
-    order = '<' if file.read(4)[2:] == b'IM' else '>'
-    total = 0
-    while len(tag := file.read(8)) == 8:
-        kind, length = struct.unpack(f'{order}II', tag)
-        after = file.tell() + length
-        unpacker = zlib.decompressobj()
-        while kind == 15 and total < MAX_FILE_BYTES and (packed := file.read(min(after - file.tell(), 1 << 16))):
-            while packed:
-                total += len(unpacker.decompress(packed, 1 << 20))
-                packed = unpacker.unconsumed_tail
-        total += 0 if kind == 15 else length
-        file.seek(after)
-    return total
+    take(sum(array.size for array in arrays.values()))
+    yield from _frames(tuple(arrays), arrays.__getitem__, place, mapping, lambda _: None)
 
 
 def _members(values: Mapping[str, Any], prefix: str = '') -> Iterator[tuple[str, AnyArray]]:
     """Yield arrays by their path: members of structs as 'run/acc', elements of arrays of these and cells from 1 on."""
     for name, value in values.items():
-        if not isinstance(value, np.ndarray):
-            continue
-        elements = {str(number): one for number, one in enumerate(value.ravel(order='F'), 1)}
-        if value.dtype.names and value.size == 1:
-            yield from _members(_record(elements['1']), f'{prefix}{name}/')
-        elif value.dtype.names:
-            for number, one in elements.items():
-                yield from _members(_record(one), f'{prefix}{name}/{number}/')
-        elif value.dtype.kind == 'O':
-            yield from _members(elements, f'{prefix}{name}/')
-        elif value.dtype.kind in 'biufU':
+        if isinstance(value, np.ndarray) and value.dtype.kind in 'OV':
+            for number, one in enumerate(value.ravel(order='F'), 1):
+                parts = {part: one[part] for part in value.dtype.names} if value.dtype.names else {str(number): one}
+                numbered = f'{number}/' if value.dtype.names and value.size > 1 else ''
+                yield from _members(parts, f'{prefix}{name}/{numbered}')
+        elif isinstance(value, np.ndarray) and value.dtype.kind in 'biufU':
             yield f'{prefix}{name}', value
-
-
-def _record(value: Any) -> dict[str, Any]:
-    return {part: value[part] for part in value.dtype.names}
 
 
 def _read_hdf5(
@@ -396,16 +352,16 @@ def _read_hdf5(
         def note(name: str, member: Any) -> None:
             """Keep a data set; the elements of references, as of cells and arrays of structs of MATLAB, from 1 on."""
             if len(found) > MAX_ARRAYS or name.count('/') > 20:
-                raise InvalidData(f"'{place}' has more than {MAX_ARRAYS} data sets, or circles of them; split it")
+                raise InvalidData(f'it has more than {MAX_ARRAYS} data sets, or circles of them; split it')
             if isinstance(member, h5py.Group):
                 for part, inner in member.items():
                     note(f'{name}/{part}', inner)
             elif h5py.check_ref_dtype(member.dtype) is h5py.Reference:
                 take(member.size)
                 folder, _, last = name.rpartition('/')
+                # Of an array of structs each member has as many references: the number stands before its name.
+                in_struct = matlab and folder and 'MATLAB_class' not in member.attrs
                 for number, one in enumerate(np.asarray(member[()]).ravel(), 1):
-                    # Of an array of structs each member has as many references: the number stands before its name.
-                    in_struct = matlab and folder and 'MATLAB_class' not in member.attrs
                     if one:
                         note(f'{folder}/{number}/{last}' if in_struct else f'{name}/{number}', file[one])
             else:
@@ -419,45 +375,32 @@ def _read_hdf5(
 
         def load(name: str) -> AnyArray:
             member = found[name]
-            if member.is_virtual or member.external:
-                raise InvalidData(f"'{place}': data set '{name}' lies in another file; copy it into this one")
             texts = h5py.check_string_dtype(member.dtype) is not None and member.dtype.kind == 'O'
-            declared = math.prod(max(1, length) for length in member.shape or ())
-            take(declared * max(1.0, member.dtype.itemsize / 8) * (4 if texts else 1))
+            take(math.prod(max(1, length) for length in member.shape or ()) * (4 if texts else 1))
             if matlab and member.attrs.get('MATLAB_empty'):
                 return np.empty(0)
             if matlab and member.attrs.get('MATLAB_class') == b'char':
                 return np.array(''.join(map(chr, np.asarray(member[()]).ravel().tolist())))
             if texts:
                 cells = np.asarray(member.asstr(errors='replace')[()], dtype=object)
-                return np.array([text[:MAX_TEXT] for text in cells.ravel()]).reshape(cells.shape)
-            _refuse_holes(member, f"'{place}': data set '{name}'")
-            array = _scaled(member, np.asarray(member[()]))
+                return np.array([text[:MAX_TEXT] for text in cells.ravel()], dtype=object).reshape(cells.shape)
+            _refuse_hidden(member, f"data set '{name}'")
+            array = np.asarray(member[()])
             return array.T if matlab else array
 
         yield from _frames(list(found), load, place, mapping, lambda _: None)
 
 
-def _refuse_holes(member: Any, where: str) -> None:
-    """Refuse a data set of which parts were never written, which HDF5 reads as zeros."""
-    if member.chunks:
-        counts = (-(-length // size) for length, size in zip(member.shape, member.chunks, strict=True))
-        holes = member.id.get_num_chunks() < math.prod(counts)
-    else:
-        holes = member.size and not member.id.get_storage_size()
-    if holes:
+def _refuse_hidden(member: Any, where: str) -> None:
+    """Refuse a data set whose values are elsewhere, were never written (HDF5 reads zeros), or are to be scaled."""
+    if member.is_virtual or member.external:
+        raise InvalidData(f'{where} lies in another file; copy it into this one')
+    counts = (-(-length // size) for length, size in zip(member.shape, member.chunks or (), strict=False))
+    wanted = math.prod(counts) if member.chunks else int(member.size > 0)
+    if (member.id.get_num_chunks() if member.chunks else int(member.id.get_storage_size() > 0)) < wanted:
         raise InvalidData(f'{where} has parts that were never written; save what was')
-
-
-def _scaled(member: Any, array: AnyArray) -> AnyArray:
-    """Return the values of a data set as its attributes scale them by the CF conventions, NaN where one is missing."""
-    given = {key: np.ravel(member.attrs[key]) for key in ('scale_factor', 'add_offset', '_FillValue', 'missing_value')
-             if key in member.attrs}  # fmt: skip
-    if not given or array.dtype.kind not in 'iuf':
-        return array
-    missing = np.isin(array, [value for key in ('_FillValue', 'missing_value') for value in given.get(key, ())])
-    scaled = array * float(given.get('scale_factor', (1.0,))[0]) + float(given.get('add_offset', (0.0,))[0])
-    return np.where(missing, np.nan, scaled)
+    if scaled := {'scale_factor', 'add_offset', '_FillValue', 'missing_value'} & {*member.attrs}:
+        raise InvalidData(f'{where} has the attribute {min(scaled)}; save the values that are meant, without it')
 
 
 def _read_wav(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:
@@ -465,10 +408,10 @@ def _read_wav(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
 
     with open_regular(path) as opened, warnings.catch_warnings():
         warnings.simplefilter('ignore')  # chunks that it does not know
-        _check_wav(opened, place)
+        _check_wav(opened)
         rate_hz, samples = wavfile.read(opened)
     if not 0 < rate_hz <= MAX_HZ:
-        raise InvalidData(f"'{place}' has a sampling rate of {rate_hz} Hz; above 0 and at most {MAX_HZ:g} is allowed")
+        raise InvalidData(f'it has a sampling rate of {rate_hz} Hz; above 0 and at most {MAX_HZ:g} is allowed')
     if samples.dtype.kind == 'u':
         samples = (samples.astype(np.float64) - 128.0) / 128.0
     elif samples.dtype.kind == 'i':
@@ -477,65 +420,48 @@ def _read_wav(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
         yield replace(frame, rate_hz=float(rate_hz))
 
 
-def _check_wav(file: Any, place: str) -> None:
+def _check_wav(file: Any) -> None:
     """Refuse a WAV file that was cut off or written to a pipe, or that holds several sounds."""
-    size = file.seek(0, io.SEEK_END)
+    size, sounds = file.seek(0, io.SEEK_END), 0
     file.seek(0)
     order = '>' if file.read(12)[:4] == b'RIFX' else '<'
-    sounds = []
     while len(head := file.read(8)) == 8:
         name, length = struct.unpack(f'{order}4sI', head)
-        if name == b'data':
-            sounds.append(length)
-            if length > size - file.tell():
-                raise InvalidData(
-                    f"'{place}' was cut off, or written to a pipe: it declares {length} bytes of sound and has "
-                    f'{size - file.tell()}; copy or save it again'
-                )
+        sounds += name == b'data'
+        if name == b'data' and length > size - file.tell():
+            raise InvalidData(
+                f'it was cut off, or written to a pipe: it declares {length} bytes of sound and has '
+                f'{size - file.tell()}; copy or save it again'
+            )
         file.seek(length + length % 2, io.SEEK_CUR)
-    if len(sounds) != 1:
-        raise InvalidData(
-            f"'{place}' has {len(sounds)} chunks of sound, one is needed; save it again as a plain WAV file"
-        )
+    if sounds != 1:
+        raise InvalidData(f'it has {sounds} chunks of sound, one is needed; save it again as a plain WAV file')
     file.seek(0)
 
 
 def _read_parquet(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:
     pyarrow, parquet = library('pyarrow', *PARQUET[1:]), library(*PARQUET)
     types = pyarrow.types
-    plain = (types.is_integer, types.is_floating, types.is_boolean, types.is_string, types.is_dictionary,
-             types.is_large_string, types.is_timestamp)  # fmt: skip
-
-    def array(column: Any) -> AnyArray:
-        if types.is_dictionary(column.type):  # each text once, however many rows have it
-            column = column.unify_dictionaries().combine_chunks()
-            one = column.chunk(0) if hasattr(column, 'chunk') else column
-            texts = np.array(['', *(str(text)[:MAX_TEXT] for text in one.dictionary.to_pylist())])
-            chosen: AnyArray = texts[1 + np.asarray(one.indices.fill_null(-1))]
-            return chosen
-        if types.is_timestamp(column.type):
-            return np.asarray(column.to_numpy()).astype('datetime64[ns]').astype(np.int64)
-        return np.asarray(column.to_numpy())
-
-    def read(numbers: Sequence[str], texts: Sequence[str], most: int | None = None) -> Columns:
-        rows = file.metadata.num_rows
-        if not rows:
-            raise InvalidData(f"'{place}' has no rows; choose files with samples")
-        wanted = list(dict.fromkeys((*numbers, *texts)))
-        take(min(rows, most or rows) * (len(wanted) + sum(name in coded for name in texts)))
-        if most:
-            content = pyarrow.Table.from_batches([next(file.iter_batches(most, columns=wanted))])
-        else:
-            content = file.read(columns=wanted, use_threads=False)
-        return columns_of({name: array(content[name]) for name in content.column_names}, place, numbers, texts)
-
     with open_regular(path) as opened:
         schema = parquet.ParquetFile(opened).schema_arrow
-        names = [one.name for one in schema if any(check(one.type) for check in plain)]
-        coded = [one.name for one in schema if types.is_string(one.type) or types.is_large_string(one.type)]
+        texts = [one.name for one in schema if types.is_string(one.type) or types.is_large_string(one.type)]
         opened.seek(0)
-        file = parquet.ParquetFile(opened, read_dictionary=coded)
-        yield TableFrame(place, names, read)
+        file = parquet.ParquetFile(opened, read_dictionary=texts)  # each text once, however many rows have it
+        if not file.metadata.num_rows:
+            raise InvalidData('it has no rows; choose files with samples')
+        take(file.metadata.num_rows * len(schema))
+        columns: dict[str, AnyArray] = {}
+        for name, column in zip(schema.names, file.read(use_threads=False).columns, strict=True):
+            if types.is_dictionary(column.type):
+                one = column.unify_dictionaries().combine_chunks()
+                one = one.chunk(0) if hasattr(one, 'chunk') else one
+                words = np.array(['', *(str(text)[:MAX_TEXT] for text in one.dictionary.to_pylist())], dtype=object)
+                columns[name] = words[1 + np.asarray(one.indices.fill_null(-1))]
+            elif types.is_timestamp(column.type):
+                columns[name] = np.asarray(column.to_numpy()).astype('datetime64[ns]').astype(np.int64)
+            elif types.is_integer(column.type) or types.is_floating(column.type) or types.is_boolean(column.type):
+                columns[name] = np.asarray(column.to_numpy())
+        yield TableFrame(place, columns)
 
 
 def _frames(
@@ -555,35 +481,31 @@ def _frames(
         if fields is not None:
             groups.setdefault(table, (fields, {}))[1][rest] = name
     if not groups:
-        raise InvalidData(
-            f"'{place}' has no array of the form '{mapping.tables}'; it has {', '.join(names[:5]) or 'none'}"
-        )
+        raise InvalidData(f"it has no array of the form '{mapping.tables}'; it has {', '.join(names[:5]) or 'none'}")
     for table, (fields, members) in sorted(groups.items()):
         within = f'{place}, {table}' if table else place
         arrays = {}
         for column, name in members.items():
             array = load(name)
             take(array.size * max(1.0, array.dtype.itemsize / 8))
-            arrays[column] = _arranged(array, mapping.format, within)
-        columns, constants = _unfolded_columns(arrays, within)
-        yield TableFrame(within, tuple(columns), partial(columns_of, columns, within), {**constants, **fields})
+            arrays[column] = _arranged(array, mapping.format)
+        yield TableFrame(within, {**_unfolded(arrays), **{key: np.array(text) for key, text in fields.items()}})
 
 
-def _arranged(array: AnyArray, form: FileFormat, place: str) -> AnyArray:
+def _arranged(array: AnyArray, form: FileFormat) -> AnyArray:
     if form.reshape and array.ndim > 1:
         if array.size != math.prod(form.reshape):
             raise InvalidData(
-                f"'{place}': an array of the shape {array.shape} has {array.size} values and cannot be read as "
+                f'an array of the shape {array.shape} has {array.size} values and cannot be read as '
                 f'{form.reshape}; correct `reshape` under `format`'
             )
         array = array.reshape(form.reshape).transpose(form.axes).reshape(array.shape)
     return np.swapaxes(array, -1, -2) if form.transpose and array.ndim > 1 else array
 
 
-def _unfolded_columns(arrays: Mapping[str, AnyArray], place: str) -> tuple[dict[str, AnyArray], dict[str, str]]:
-    """Return the columns of arrays, (n,) each, and what holds for all rows."""
+def _unfolded(arrays: Mapping[str, AnyArray]) -> dict[str, AnyArray]:
+    """Return the columns of arrays, (n,) each, or () where there is one value."""
     columns: dict[str, AnyArray] = {}
-    constants: dict[str, str] = {}
     trials = next((array.shape[:2] for array in arrays.values() if array.ndim == 3), None)
     # The members of an array of records are arrays, too.
     plain: dict[str, AnyArray] = {}
@@ -592,14 +514,14 @@ def _unfolded_columns(arrays: Mapping[str, AnyArray], place: str) -> tuple[dict[
             plain[_joined(name, part)] = array.squeeze()[part] if part else array
     for name, array in plain.items():
         if array.size == 1:
-            constants[name] = str(array.item())[:MAX_TEXT]
+            columns[name] = array.reshape(())
         elif trials and array.ndim <= 2 and array.size == trials[0]:
             columns[name] = np.repeat(array.ravel(), trials[1])
         elif array.ndim == 1 or (array.ndim == 2 and (1 in array.shape or not array.size)):
             columns[name or '0'] = array.ravel()
         elif array.ndim not in (2, 3) or array.shape[-1] > MAX_CHANNELS:
             raise InvalidData(
-                f"'{place}': '{name}' has the shape {array.shape}; (n_samples, n_channels) is needed, at most "
+                f"'{name}' has the shape {array.shape}; (n_samples, n_channels) is needed, at most "
                 f'{MAX_CHANNELS} channels; see `transpose` under `format`'
             )
         else:
@@ -607,91 +529,55 @@ def _unfolded_columns(arrays: Mapping[str, AnyArray], place: str) -> tuple[dict[
             columns |= {_joined(name, str(number)): flat[:, number] for number in range(flat.shape[1])}
     if trials:
         columns[TRIAL] = np.repeat(np.arange(trials[0]), trials[1])
-    return columns, constants
+    return columns
 
 
 def _joined(name: str, part: str) -> str:
     return f'{name}.{part}' if name and part else name or part
 
 
-def columns_of(
-    columns: Mapping[str, AnyArray], place: str, numbers: Sequence[str], texts: Sequence[str], most: int | None = None
-) -> Columns:
-    """Return columns, (n,) each, as numbers and texts; NaN for numbers that are not finite."""
-    read: dict[str, Array] = {}
-    for name in numbers:
-        array = columns[name][:most]
-        if array.dtype.kind not in 'biuf':
-            raise InvalidData(f"'{place}': column '{name}' holds {array.dtype}; numbers are needed, name another")
-        read[name] = array.astype(np.float64)
-        read[name][~np.isfinite(read[name])] = np.nan
-    return Columns(read, {name: _texts(columns[name][:most]) for name in texts})
-
-
-def _texts(array: AnyArray) -> AnyArray:
-    if array.dtype.kind == 'S':
-        return np.char.decode(array, 'utf-8', 'replace')
-    if array.dtype.kind == 'f':
-        known = np.isfinite(array)
-        whole = np.array_equal(array[known], np.round(array[known]))  # 3.0 is meant as 3
-        return np.where(known, np.where(known, array, 0.0).astype(np.int64 if whole else float).astype(str), '')
-    return array.astype(str)
-
-
-# --------------------
-# Bags of messages: each number of a message is a column, such as '/wrench/wrench.force.x'.
+# ---- bags of messages: each number of a message is a column, such as '/wrench/wrench.force.x'
 
 MAX_FIELDS = 2000  # of one message
-Rows = Mapping[str, AnyArray]  # name → values of one message, (n,) each; n > 1 where it holds consecutive samples
-Messages = Mapping[str, Sequence[tuple[Rows, int, int, str]]]  # by topic: values, stamp and time of logging, ns, frame
-BROKEN = (struct.error, UnicodeDecodeError, ValueError, IndexError, AssertionError, KeyError, TypeError)
-TIME, FRAME = 'time', 'header.frame_id'
 AXES = ('samples', 'channels')
 OTHER_CLOCK_NS = NANOSECONDS  # stamps that differ more from the time of logging are of another clock
 
 
-def _collect(value: Any, path: str, found: dict[str, AnyArray]) -> None:
-    """Add every number and text of a message by its path, such as 'wrench.force.x' or 'data.3'."""
-    if len(found) > MAX_FIELDS:
-        raise ValueError(f'it has more than {MAX_FIELDS} numbers')
+def _values(value: Any, path: str, found: dict[str, AnyArray]) -> None:
+    """Add every number and text of a message by its path, such as 'wrench.force.x' or 'data.3', (1,) each."""
     if dataclasses.is_dataclass(value):
         for part in dataclasses.fields(value):
-            if part.name not in ('header', '__msgtype__'):
-                _collect(getattr(value, part.name), f'{path}.{part.name}' if path else part.name, found)
+            if part.name not in ('stamp', '__msgtype__'):
+                _values(getattr(value, part.name), _joined(path, part.name), found)
     elif isinstance(value, (np.ndarray, Sequence)) and not isinstance(value, str):
-        if len(value) > MAX_FIELDS:
-            raise ValueError(f"'{path}' has {len(value)} numbers; {MAX_FIELDS} are allowed")
-        for number, one in enumerate(value):
-            _collect(one, f'{path}.{number}', found)
+        for number, one in enumerate(value[: MAX_FIELDS + 1]):
+            _values(one, f'{path}.{number}', found)
     else:
-        found[path] = np.array([value])
+        found[path] = np.array([value], dtype=object if isinstance(value, str) else None)
+    if len(found) > MAX_FIELDS:
+        raise InvalidData(f'it has more than {MAX_FIELDS} numbers')
 
 
-def _rows_of(value: Any, msgtype: str) -> Rows:
-    """Return the values of a message by name; of an array of two dimensions, consecutive rows."""
-    if msgtype == 'sensor_msgs/msg/JointState':
-        kinds = ('position', 'velocity', 'effort')
-        return {
-            f'{kind}.{joint}': np.array([number])
-            for kind in kinds for joint, number in zip(value.name, getattr(value, kind), strict=False)
-        }  # fmt: skip
-    if msgtype in ('std_msgs/msg/Float32MultiArray', 'std_msgs/msg/Float64MultiArray'):
-        axes, table = value.layout.dim, value.data[value.layout.data_offset :][None]
-        if len(axes) == 2:
-            table = table.reshape([axis.size for axis in axes])
-            labels = tuple(axis.label.strip().lower() for axis in axes)
-            if labels not in (AXES, AXES[::-1]):
-                raise InvalidData(
-                    f"its dimensions are named '{labels[0]}' and '{labels[1]}', which does not tell samples from "
-                    "channels; republish it with the labels 'samples' and 'channels'"
-                )
-            table = table if labels == AXES else table.T
-        if table.shape[1] > MAX_FIELDS:
-            raise ValueError(f'it has {table.shape[1]} channels; {MAX_FIELDS} are allowed')
-        return {f'data.{number}': table[:, number] for number in range(table.shape[1])}
+def _rows_of(value: Any, msgtype: str) -> dict[str, AnyArray]:
+    """Return the values of a message by name, (n,) each; of an array of two dimensions, n consecutive samples."""
     found: dict[str, AnyArray] = {}
-    _collect(value, '', found)
-    return found
+    if msgtype == 'sensor_msgs/msg/JointState':  # whose order may differ from bag to bag
+        for kind in ('position', 'velocity', 'effort'):
+            numbers = zip(value.name, getattr(value, kind), strict=False)
+            found |= {f'{kind}.{joint}': np.array([number]) for joint, number in numbers}
+        return found
+    if msgtype not in ('std_msgs/msg/Float32MultiArray', 'std_msgs/msg/Float64MultiArray') or not value.layout.dim[1:]:
+        _values(value, '', found)
+        return found
+    labels = tuple(axis.label.strip().lower() for axis in value.layout.dim)
+    if labels not in (AXES, AXES[::-1]):
+        raise InvalidData(
+            f'its dimensions are named {", ".join(map(repr, labels))}, which does not tell samples from channels; '
+            "republish it with the labels 'samples' and 'channels'"
+        )
+    table = value.data[value.layout.data_offset :].reshape([axis.size for axis in value.layout.dim])
+    table = table if labels == AXES else table.T
+    return {f'data.{number}': table[:, number] for number in range(min(table.shape[1], MAX_FIELDS))}
 
 
 def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:
@@ -700,109 +586,91 @@ def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
     Times are those of the headers, or of logging where there are none, from the first message of the bag on. A device
     clock that differs from that of the recorder is corrected by it.
     """
-    columns_of_streams = [column for stream in mapping.streams.values() for column in stream.columns]
-    wanted = {*columns_of_streams, *mapping.numbers(), *mapping.texts()}
-    messages = _messages(path, place, wanted, take)
-    ahead_ns = _clocks_ahead_ns(messages, place)
-    begin_ns = next(found[0][1] - ahead_ns[name] for name, found in messages.items())
-    columns: dict[str, AnyArray] = {}
-    clocks: dict[str, str] = {}
-    for name, found in messages.items():
-        all_rows, stamps_ns, _, frames = zip(*found, strict=True)
-        parts = {part: np.concatenate([rows[part] for rows in all_rows]) for part in all_rows[0]}
-        counts = np.array([max(map(len, rows.values()), default=0) for rows in all_rows])
-        if f'{name}/{FRAME}' in wanted:
-            parts[FRAME] = np.repeat(np.array(frames), counts)
-        elif len({*frames}) > 1:
-            raise InvalidData(
-                f"'{place}', topic '{name}': its messages have the frames {', '.join(sorted({*frames})[:4])}, so "
-                f"several sensors may publish there; choose one by rows: {{'{name}/{FRAME}': '{min(frames)}'}}"
-            )
-        # The samples of one message lie evenly between it and the next.
-        times_s = (np.array(stamps_ns) - ahead_ns[name] - begin_ns) / NANOSECONDS
-        usual_s = float(np.median(np.diff(times_s))) if len(times_s) > 1 else 0.0
-        steps_s = np.diff(times_s, append=times_s[-1] + usual_s)
-        within = np.concatenate([np.arange(count) / max(count, 1) for count in counts])
-        clock = f'{name}/{TIME}'
-        columns[clock] = np.repeat(times_s, counts) + np.repeat(steps_s, counts) * within
-        columns |= {f'{name}/{part}': array for part, array in parts.items()}
-        clocks |= {f'{name}/{part}': clock for part in parts}
-    yield TableFrame(place, tuple(columns), partial(columns_of, columns, place), clocks=clocks)
-
-
-def _messages(path: Path, place: str, wanted: AbstractSet[str], take: Take) -> Messages:
-    """Return the messages of the topics that are wanted."""
-    messages: dict[str, list[tuple[Rows, int, int, str]]] = {}
+    wanted = {column for stream in mapping.streams.values() for column in stream.columns}
+    topics = {name.rpartition('/')[0] or name for name in (*wanted, *mapping.numbers(), *mapping.texts())}
     seen: dict[str, Any] = {}
     types: dict[str, Any] = {}
+    rows: dict[str, list[dict[str, AnyArray]]] = {}
+    stamps: dict[str, list[tuple[int, int]]] = {}  # by the device and the recorder, ns
 
-    def chosen(connection: Any) -> bool:
+    def is_wanted(connection: Any) -> bool:
         seen[connection.topic] = connection
-        return any(fnmatch.fnmatchcase(connection.topic, name.rpartition('/')[0] or name) for name in wanted)
+        return any(fnmatch.fnmatchcase(connection.topic, topic) for topic in topics)
 
-    for message in read_foreign(path, chosen):
-        name, msgtype = message.topic, message.msgtype
+    for message in read_foreign(path, is_wanted):
+        name = message.topic
         if name not in types:
-            types[name] = _types_of(seen[name], place)
-        found = messages.setdefault(name, [])
-        where = f"'{place}': message {len(found)} of '{name}'"
+            types[name] = _types_of(seen[name])
+        before = rows.setdefault(name, [])
         try:
-            value = types[name].deserialize_cdr(message.data, msgtype)
-            rows = _rows_of(value, msgtype)
-        except InvalidData as error:
-            raise InvalidData(f'{where}: {error}') from error
-        except BROKEN as error:
-            raise InvalidData(f'{where} is damaged: {error}; record it again') from error
-        if found and rows.keys() != found[0][0].keys():
-            other = ', '.join(sorted(rows.keys() ^ found[0][0].keys())[:5])
-            raise InvalidData(f'{where} has other fields than the first: {other}')
-        take(10 * len(rows) + sum(len(array) for array in rows.values()))  # small arrays take more than their values
-        header = getattr(value, 'header', None)
-        stamp = getattr(header, 'stamp', None)
+            value = types[name].deserialize_cdr(message.data, message.msgtype)
+            found = _rows_of(value, message.msgtype)
+        except Exception as error:
+            raise InvalidData(f"message {len(before)} of '{name}' cannot be read: {error}; record it again") from error
+        if before and found.keys() != before[0].keys():
+            other = ', '.join(sorted(found.keys() ^ before[0].keys())[:5])
+            raise InvalidData(f"message {len(before)} of '{name}' has other fields than the first: {other}")
+        take(10 * len(found) + sum(map(len, found.values())))  # small arrays take more than their values
+        before.append(found)
+        stamp = getattr(getattr(value, 'header', None), 'stamp', None)
         stamp_ns = stamp.sec * NANOSECONDS + stamp.nanosec if stamp else 0
-        found.append((rows, stamp_ns or message.log_ns, message.log_ns, getattr(header, 'frame_id', '')))
-    if not messages:
+        stamps.setdefault(name, []).append((stamp_ns or message.log_ns, message.log_ns))
+    if not rows:
         raise InvalidData(
-            f"'{place}' has no topic that the mapping names ({', '.join(sorted(wanted))}); it has "
+            f'it has no topic that the mapping names ({", ".join(sorted(wanted))}); it has '
             f"{', '.join(sorted(seen)) or 'none'}; write columns as topic and field, such as '/wrench/wrench.force.x'"
         )
-    return messages
+    times_ns = _by_one_clock({name: np.array(pairs) for name, pairs in stamps.items()})
+    begin_ns = next(iter(times_ns.values()))[0]
+    columns: dict[str, AnyArray] = {}
+    clocks: dict[str, str] = {}
+    for name, parts in rows.items():
+        # The samples of one message lie evenly between it and the next.
+        times_s = (times_ns[name] - begin_ns) / NANOSECONDS
+        counts = np.array([max(map(len, part.values()), default=0) for part in parts])
+        steps_s = np.diff(times_s, append=times_s[-1] + (np.median(np.diff(times_s)) if len(times_s) > 1 else 0.0))
+        within = np.concatenate([np.arange(count) / max(count, 1) for count in counts])
+        clock = f'{name}/time'
+        columns[clock] = np.repeat(times_s, counts) + np.repeat(steps_s, counts) * within
+        for part in parts[0]:
+            columns[f'{name}/{part}'] = np.concatenate([one[part] for one in parts])
+            clocks[f'{name}/{part}'] = clock
+    yield TableFrame(place, columns, clocks=clocks)
 
 
-def _types_of(connection: Any, place: str) -> Any:
+def _types_of(connection: Any) -> Any:
     """Return the types of the messages of a topic by the definition that the bag stores, or else that of ROS 2."""
     types, msgtype = message_types(connection), connection.msgtype
     if msgtype.startswith('audio_common_msgs/'):
-        raise InvalidData(
-            f"'{place}': '{connection.topic}' is sound whose messages do not tell the format; give a WAV file"
-        )
+        raise InvalidData(f"'{connection.topic}' is sound whose messages do not tell the format; give a WAV file")
     if msgtype not in types.types:
         raise InvalidData(
-            f"'{place}': the messages of '{connection.topic}' are {msgtype}, whose definition is neither in the bag "
+            f"the messages of '{connection.topic}' are {msgtype}, whose definition is neither in the bag "
             'nor of ROS 2 itself; record it as MCAP, which stores definitions, or republish it as a standard message'
         )
     return types
 
 
-def _clocks_ahead_ns(messages: Messages, place: str) -> dict[str, int]:
-    """Return by how much the clock of each topic is ahead of the recorder's; 0 if all topics have one clock."""
-    ahead = {name: [stamp_ns - log_ns for _, stamp_ns, log_ns, _ in found] for name, found in messages.items()}
-    usual_ns = {name: round(np.median(values)) for name, values in ahead.items()}
-    if max(usual_ns.values()) - min(usual_ns.values()) <= OTHER_CLOCK_NS:
-        return dict.fromkeys(messages, 0)
-    for name, values in ahead.items():
-        low, high = np.percentile(values, (5, 95)).tolist()
+def _by_one_clock(stamps: Mapping[str, AnyArray]) -> dict[str, AnyArray]:
+    """Return the times of the messages of each topic, ns: as stamped, or by the recorder's clock if they have several.
+
+    `stamps` are (n, 2), by the device and by the recorder.
+    """
+    ahead = {name: np.percentile(both[:, 0] - both[:, 1], (5, 50, 95)) for name, both in stamps.items()}
+    usual = [middle for _, middle, _ in ahead.values()]
+    if max(usual) - min(usual) <= OTHER_CLOCK_NS:
+        return {name: both[:, 0] for name, both in stamps.items()}
+    for name, (low, middle, high) in ahead.items():
         if high - low > OTHER_CLOCK_NS:
             raise InvalidData(
-                f"'{place}', topic '{name}': the stamps differ from the times of logging, which other topics have, by "
-                f'{usual_ns[name] / NANOSECONDS:.4g} s, and that changes by {(high - low) / NANOSECONDS:.3g} s; record '
-                'topics with stamps of one clock'
+                f"topic '{name}': the stamps differ from the times of logging, which other topics have, by "
+                f'{middle / NANOSECONDS:.4g} s, and that changes by {(high - low) / NANOSECONDS:.3g} s; record topics '
+                'with stamps of one clock'
             )
-    return usual_ns
+    return {name: both[:, 0] - round(ahead[name][1]) for name, both in stamps.items()}
 
 
-# --------------------
-# The kinds of files.
+# ---- the kinds of files
 
 BAG = 'bag'
 READERS: Mapping[str, Callable[[Path, str, TableMapping, Take], Iterator[TableFrame]]] = {
@@ -818,7 +686,7 @@ READERS: Mapping[str, Callable[[Path, str, TableMapping, Take], Iterator[TableFr
     '.parquet': _read_parquet,
     BAG: _read_bag,
 }
-OTHER_KINDS = {'.bag': 'is a bag of ROS 1; convert it: rosbags-convert --src FILE.bag --dst FOLDER'}
+OTHER_KINDS = {'.bag': 'it is a bag of ROS 1; convert it: rosbags-convert --src FILE.bag --dst FOLDER'}
 # Libraries that a kind of file needs: module, what it reads, and the extra of this package that brings it.
 HDF5 = ('h5py', 'HDF5 files', 'hdf5')
 PARQUET = ('pyarrow.parquet', 'Parquet files', 'parquet')

@@ -15,7 +15,7 @@ from itertools import groupby, pairwise
 from operator import itemgetter
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -32,12 +32,7 @@ from texture_core.types import (
     TactileSignal,
     join_batches,
 )
-from texture_features.windows import WindowBatch
 from texture_recordings.bags import find_bags, read_bag
-
-if TYPE_CHECKING:
-    pass
-
 
 # --------------------
 # One labelled slide in a bag.
@@ -164,8 +159,8 @@ class SlideSamples:
     >>> from texture_recordings.dataset import SlideDataset
     >>> dataset = SlideDataset.from_arrays({'signal': [np.ones((100, 1))]}, ['cork'], {'signal': 100.0}, speed_m_s=0.05)
     >>> [slide] = dataset.samples('signal')
-    >>> slide.surface, slide.windows(count=50).samples.shape
-    ('cork', (50, 1))
+    >>> slide.surface, slide.samples.shape
+    ('cork', (100, 1))
     """
 
     slide: LabelledSlide
@@ -181,11 +176,6 @@ class SlideSamples:
     def surface(self) -> str:
         """The label."""
         return self.slide.surface
-
-    @property
-    def distance_m(self) -> float:
-        """How far the finger slid; NaN if the speed is unknown."""
-        return len(self.samples) / self.rate_hz * self.speed_m_s
 
     @classmethod
     def of(cls, slide: LabelledSlide, topic: str) -> SlideSamples:
@@ -209,27 +199,6 @@ class SlideSamples:
             slide, samples[: max(first, 0)], samples[max(first, 0) : last], rate_hz, batches[0].channels,
             slide.speed_m_s, slide.force_n, slide.direction_rad,
         )  # fmt: skip
-
-    def windows(self, start: int = 0, count: int | None = None, speed_m_s: float | None = None) -> WindowBatch:
-        """Return a stretch of the slide, all of it by default, to be described; at another speed if one is given.
-
-        Parameters
-        ----------
-        start
-            Number of the first sample.
-        count
-            Number of samples; None for all from there on.
-        speed_m_s
-            Speed to which the stretch is resampled; None keeps that of the slide.
-
-        Returns
-        -------
-        WindowBatch
-            One window.
-        """
-        samples = self.samples[start : None if count is None else start + count]
-        speed = self.speed_m_s if speed_m_s is None else speed_m_s
-        return WindowBatch(samples, self.rate_hz, np.array(speed), np.array(self.force_n), channels=self.channels)
 
 
 def covered(states: Sequence[ExplorationState]) -> tuple[int, int]:

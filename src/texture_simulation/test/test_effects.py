@@ -18,7 +18,6 @@ from texture_simulation.effects import (
     ForceGain,
     Noise,
     PatchGrowth,
-    Skids,
     SlideError,
     UnevenMotion,
     Unevenness,
@@ -59,17 +58,6 @@ def test_dropouts_repeat_the_last_sample_for_so_long_and_so_often() -> None:
     assert (made <= samples[:, 0]).all()
     runs = np.diff(np.flatnonzero(np.diff(np.concatenate([[0], held, [0]]))))[::2]
     assert np.median(runs) == 20
-
-
-def test_a_skid_holds_the_skin_and_lets_it_catch_up() -> None:
-    path = along_x(0.1, 20_000)
-    skin = Skids(per_s=1.0, length_s=0.05).start_path(rng(3), RATE_HZ, ())(path)
-    behind_m = path.x_m - skin.x_m
-    assert behind_m.min() >= -1e-12
-    assert behind_m.max() == pytest.approx(0.1 * 0.05, rel=0.05)
-    assert (np.diff(skin.x_m) == 0).mean() == pytest.approx(0.05, rel=0.5)
-    assert np.median(behind_m) < 1e-5
-    assert (np.diff(skin.x_m) >= -1e-12).all()
 
 
 def test_uneven_motion_displaces_the_skin_along_its_way_only() -> None:
@@ -121,13 +109,11 @@ def test_blocks_of_samples_give_the_same_as_the_whole(kind: type) -> None:
     assert np.allclose(pieces, on_signal(kind(), samples))
 
 
-@pytest.mark.parametrize('kind', [effect for effect in EFFECTS.values() if hasattr(effect, 'start_path')])
-def test_blocks_of_a_path_give_the_same_as_the_whole(kind: type) -> None:
+def test_blocks_of_a_path_give_the_same_as_the_whole() -> None:
     path = along_x(0.1)
-    often = {'per_s': 5.0} if kind is Skids else {}
-    through = kind(**often).start_path(rng(), RATE_HZ, ())
+    through = UnevenMotion().start_path(rng(), RATE_HZ, ())
     pieces = [through(path.at(slice(a, b))) for a, b in itertools.pairwise(CUTS)]
-    whole = kind(**often).start_path(rng(), RATE_HZ, ())(path)
+    whole = UnevenMotion().start_path(rng(), RATE_HZ, ())(path)
     assert np.allclose(np.concatenate([piece.x_m for piece in pieces]), whole.x_m)
 
 

@@ -16,7 +16,6 @@ from texture_core.errors import UnknownName
 from texture_core.types import NANOSECONDS, FingerSender, FingerState, TactileSignal, lost_samples
 from texture_drivers.sensor import SensorParams
 from texture_drivers.tsf85 import Tsf85
-from texture_simulation.devices.fingers import Tsf85Encoder
 from texture_simulation.emulator import LIVE_SENSORS, Emulator, EmulatorParams
 from texture_simulation.path import straight
 from texture_simulation.scene import load_scene
@@ -117,18 +116,6 @@ def test_a_device_that_is_silent_after_opening_is_woken(emulator: Emulator, tmp_
     read(sensor, 300)
     sensor.close()
     assert (sensor.counts['revived'], sensor.counts['reopened']) == (3, 0)
-
-
-def test_the_second_finger_and_old_firmware_are_understood(tmp_path: Path) -> None:
-    emulator = emulated(tmp_path)
-    emulator.device._encoder = Tsf85Encoder(finger=1, long_stamps=False)
-    sensor = Tsf85(SensorParams(device=str(tmp_path / 'tsf85'), finger=1))
-    with emulator:
-        sensor.open()
-        batches = read(sensor, 500)
-        sensor.close()
-    assert lost_samples(batches) == 0
-    assert values(batches).std() > 5
 
 
 FORCE_N = 2.0

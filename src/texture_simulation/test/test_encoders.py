@@ -8,12 +8,7 @@ import numpy as np
 import pytest
 
 from texture_drivers.biotac import LAYOUTS, decode, sampling_command
-from texture_simulation.devices.fingers import (
-    SampledStream,
-    Tsf85Encoder,
-    commands,
-    encode_replies,
-)
+from texture_simulation.devices.fingers import SampledStream, Tsf85Encoder, commands, encode_replies
 from texture_simulation.devices.fingers import encode_samples as encode
 
 

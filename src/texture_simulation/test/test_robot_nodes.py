@@ -3,17 +3,23 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import time
 from contextlib import closing
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped
 
+from texture_core.ros import to_ns
 from texture_core.ros_testing import LocalGraph
 from texture_core.types import FingerReceiver, FingerState
 from texture_simulation.nodes.leap_hand import LeapHandNode
 from texture_simulation.nodes.rails import RailsNode
+from texture_simulation.nodes.twist_controller import TwistControllerNode
 from texture_simulation.nodes.ur_controller import UrControllerNode
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
@@ -57,3 +63,22 @@ def test_the_controller_lives_and_ends_with_its_node_which_reports_if_it_dies(gr
     os.kill(controller.pid, 9)
     os.waitid(os.P_PID, controller.pid, os.WEXITED | os.WNOWAIT)
     graph.until(lambda: 'the emulated controller ended' in reports[-1].status[0].message)
+
+
+def test_a_pose_is_that_of_its_stamp_on_a_machine_that_pauses(graph, monkeypatch):
+    node = graph.add(TwistControllerNode, command_timeout_s=0.0)
+    pauses, clock = itertools.cycle([0.0, 0.0, 0.0, 0.03]), node.get_clock()
+
+    def now():
+        found = clock.now()
+        time.sleep(next(pauses))
+        return found
+
+    monkeypatch.setattr(node, 'get_clock', lambda: SimpleNamespace(now=now))
+    poses = graph.listen(PoseStamped, 'tcp_pose_broadcaster/pose')
+    with node._lock:
+        node._arm.command(time.monotonic_ns(), np.array([0.05, 0.0, 0.0]))
+    graph.until(lambda: len(poses) > 60)
+    places = np.array([(to_ns(one.header.stamp) * 1e-9, one.pose.position.x) for one in poses[20:]])
+    ways_m = np.diff(places[::5], axis=0)  # 20 ms and more
+    assert ways_m[:, 1] / ways_m[:, 0] == pytest.approx(0.05, rel=0.1)

@@ -20,11 +20,7 @@ from sensor_rig import CASES, Feed, Rig, biotac, counting
 from texture_core.types import lost_samples
 from texture_drivers.biotac import BioTac
 from texture_drivers.sensor import SensorParams
-from texture_simulation.devices.fingers import (
-    ByteFaults,
-    EmulatedBioTac,
-    EmulatedTsf85,
-)
+from texture_simulation.devices.fingers import ByteFaults, EmulatedBioTac, EmulatedTsf85
 
 pytestmark = pytest.mark.realtime
 

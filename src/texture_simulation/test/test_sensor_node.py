@@ -4,8 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -25,7 +24,6 @@ from texture_core.ros_testing import LocalGraph
 from texture_core.types import ExplorationState, Phase
 from texture_drivers import health as stream_watch
 from texture_drivers.nodes.sensor import SensorNode
-from texture_simulation.devices.fingers import FrameFaults
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
@@ -129,83 +127,23 @@ def test_a_tare_without_a_sensor_is_refused(graph: LocalGraph, tmp_path: Path) -
     assert response.message == 'the sensor delivers no samples; see its message on /diagnostics'
 
 
-def test_a_recording_is_played_as_a_sensor(graph: LocalGraph, tmp_path: Path) -> None:
-    np.savez(tmp_path / 'slide.npz', samples=np.arange(500.0)[:, None], rate_hz=1000.0, channels=['film'])
-    signal = graph.listen(msg.TactileSignal, 'signal', SENSOR_QOS)
-    graph.add(SensorNode, sensor='file', device=str(tmp_path / 'slide.npz'), config='{loop: true, unit: Pa}')
-    graph.until(lambda: len(signal) > 60)
-    assert (signal[-1].sensor, signal[-1].units, signal[-1].channels) == ('file/slide', ['Pa'], ['film'])
-    assert all(message.samples[0] == message.first_sample % 500 for message in signal)
-
-
-OK, WARN, ERROR = b'\x00', b'\x01', b'\x02'
-
-
-class Ear:
-    """The node, and what it publishes."""
-
-    def __init__(self, graph: LocalGraph, rig: Rig, name: str) -> None:
-        self.node = graph.add(SensorNode, sensor=name, device=str(rig.link), config=rig.case.config, autostart=False)
-        self._batches = graph.listen(msg.TactileSignal, rig.case.topic, SENSOR_QOS)
-        self._reports = graph.listen(DiagnosticArray, '/diagnostics')
-        self._until = graph.until
-
-    def more(self) -> None:
-        self._batches.clear()
-        self._until(lambda: len(self._batches) > 5)
-
-    def level(self, wanted: bytes) -> Any:
-        self._until(lambda: self._reports and self._reports[-1].status[0].level == wanted)
-        return self._reports[-1].status[0]
-
-
-@pytest.fixture
-def make(graph: LocalGraph, tmp_path: Path) -> Iterator[Callable[[str], tuple[Rig, Ear]]]:
-    with ExitStack() as rigs:
-
-        def make(name: str) -> tuple[Rig, Ear]:
-            rig = rigs.enter_context(Rig(name, tmp_path / name))
-            return rig, Ear(graph, rig, name)
-
-        yield make
-
-
 # One of each kind of topics: of a single finger, of several, and in addition to the signal.
 @pytest.mark.parametrize('name', ['tsf85', 'biotac_hand', 'pvdf', 'anyskin', 'tsf85_pair'])
-def test_a_life_from_configuring_to_cleaning_up(make: Any, name: str) -> None:
-    rig, ear = make(name)
+def test_a_life_from_configuring_to_cleaning_up(graph: LocalGraph, tmp_path: Path, name: str) -> None:
     turns = 2 if name == 'tsf85' else 1
-    for _ in range(turns):
-        assert ear.node.trigger_configure() == TransitionCallbackReturn.SUCCESS
+    with Rig(name, tmp_path / name) as rig:
+        node = graph.add(SensorNode, sensor=name, device=str(rig.link), config=rig.case.config, autostart=False)
+        batches = graph.listen(msg.TactileSignal, rig.case.topic, SENSOR_QOS)
         for _ in range(turns):
-            assert ear.node.trigger_activate() == TransitionCallbackReturn.SUCCESS
-            ear.more()
-            assert ear.node.trigger_deactivate() == TransitionCallbackReturn.SUCCESS
-            rig.another().open()  # inactive, it lets go of the device
-        assert ear.node.trigger_cleanup() == TransitionCallbackReturn.SUCCESS
-    assert ear.node.trigger_shutdown() == TransitionCallbackReturn.SUCCESS
-
-
-def test_the_level_falls_with_each_fault_and_rises_again(make: Any) -> None:
-    rig, ear = make('daq')
-    ear.level(WARN)  # not active yet
-    ear.node.trigger_configure()
-    ear.node.trigger_activate()
-    ear.level(OK)
-    rig.set(frame_faults=FrameFaults(skip=0.02))
-    assert 'samples lost' in ear.level(WARN).message
-    rig.set(frame_faults=FrameFaults())
-    ear.level(OK)
-    rig.run_locked(rig.device.unplug)
-    assert str(rig.link) in ear.level(ERROR).message
-    rig.run_locked(rig.device.plug)
-    ear.level(OK)
-    rig.set(silent=True)
-    ear.level(ERROR)
-    rig.set(silent=False)
-    values = {value.key: value.value for value in ear.level(OK).values}
-    assert int(values['reopened']) >= 1
-    assert 'device clock slow by [ppm]' in values
+            assert node.trigger_configure() == TransitionCallbackReturn.SUCCESS
+            for _ in range(turns):
+                assert node.trigger_activate() == TransitionCallbackReturn.SUCCESS
+                batches.clear()
+                graph.until(lambda: len(batches) > 5)
+                assert node.trigger_deactivate() == TransitionCallbackReturn.SUCCESS
+                rig.another().open()  # inactive, it lets go of the device
+            assert node.trigger_cleanup() == TransitionCallbackReturn.SUCCESS
+        assert node.trigger_shutdown() == TransitionCallbackReturn.SUCCESS
 
 
 def test_parameters_that_the_sensor_refuses_end_the_node_with_a_sentence(graph: LocalGraph) -> None:

@@ -22,7 +22,7 @@ SPEEDS_M_S = (0.02, 0.05, 0.1, 0.2, 0.4)
 ANGLES_RAD = (0.0, 0.4, 0.8, 1.2, -2.5)
 ROUGH = {'kind': 'self_affine', 'rms_m': 1e-5, 'seed': 5}
 FRICTIONS = ([], [{'kind': 'sliding_friction'}], [{'kind': 'stick_slip'}])
-ALL_EFFECTS = ('skids', 'patch_growth', 'force_gain', 'unevenness', 'noise', 'dropouts')
+ALL_EFFECTS = ('uneven_motion', 'patch_growth', 'force_gain', 'unevenness', 'noise', 'dropouts')
 
 
 def ridges(pitch_m: float = PITCH_M, **more: object) -> Scene:

@@ -153,60 +153,6 @@ class Noise:
 
 
 # --------------------
-# The skin sticks, is stretched, and jumps after.
-
-CATCH_UP_S = 4e-3  # time constant of the jump
-FORGOTTEN = 8.0  # time constants after which nothing of a skid is left
-
-
-@dataclass(frozen=True)
-class Skids:
-    """Occasionally the skin sticks for a moment while the finger moves on, then catches up.
-
-    A cheap approximation of stick-slip, for slides of which some failed.
-    """
-
-    per_s: float = param(0.5, 'Rate at which the skin sticks and jumps.', unit='1/s', low=0.0, high=20.0)
-    length_s: float = param(0.05, 'Duration of sticking before the jump.', unit='s', low=1e-3, high=1.0)
-
-    def start_path(self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape) -> TrajectoryFilter:
-        """Return what lets the skin lag behind the finger."""
-        length, kept = max(1, round(self.length_s * rate_hz)), math.exp(-1 / (CATCH_UP_S * rate_hz))
-        since = np.full(batch_shape, 10**9)  # points since the last skid began
-        held = [np.zeros(batch_shape), np.zeros(batch_shape)]  # where
-        farthest = length + FORGOTTEN * CATCH_UP_S * rate_hz
-
-        def lag(path: Trajectory) -> Trajectory:
-            nonlocal since
-            count = len(path)
-            begins = rng.random((*batch_shape, count)) < self.per_s / rate_hz * (path.force_n > 0)
-            if not begins.any() and not (since < farthest).any():
-                since = since + count
-                return path
-            number = np.arange(count)
-            last = np.maximum.accumulate(np.where(begins, number, -1), axis=-1)
-            age = number - np.where(last >= 0, last, -since[..., None])
-            # Where the finger is when the skin comes loose is what it catches up with from then on.
-            weight = np.where(age < length, 1.0, kept ** np.maximum(age - length + 1.0, 0.0))
-            skin = [_lagging(place, hold, last, weight) for place, hold in zip((path.x_m, path.y_m), held, strict=True)]
-            for i, place in enumerate((path.x_m, path.y_m)):
-                end = last[..., -1]
-                began = np.take_along_axis(place, np.maximum(end, 0)[..., None], axis=-1)[..., 0]
-                held[i] = np.where(end >= 0, began, held[i])
-            since = age[..., -1] + 1
-            return Trajectory(skin[0], skin[1], path.force_n)
-
-        return lag
-
-
-def _lagging(place_m: Array, held_m: Array, last: Array, weight: Array) -> Array:
-    """Return the position of the skin: `weight` of the distance back to the beginning of the last skid, (..., n)."""
-    began = np.take_along_axis(place_m, np.maximum(last, 0), axis=-1)
-    began = np.where(last >= 0, began, held_m[..., None])
-    return place_m + weight * (began - place_m)
-
-
-# --------------------
 # A robot does not move quite evenly, and the skin creeps.
 
 # Cubic B-spline through normal values: the standard deviation of its sum in the mean over a section.
@@ -313,7 +259,6 @@ class Unevenness:
 EFFECTS: Mapping[str, type] = {
     'slide_error': SlideError,  # the robot is faster or slower, presses harder or less than it should
     'uneven_motion': UnevenMotion,  # the skin is ahead of its path or behind
-    'skids': Skids,  # the skin sticks for a moment and jumps after
     'patch_growth': PatchGrowth,  # a harder pressed finger senses fine textures less
     'force_gain': ForceGain,  # a harder pressed finger senses textures more
     'unevenness': Unevenness,  # no sample is everywhere the same

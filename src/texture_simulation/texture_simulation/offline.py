@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import heapq
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from texture_core.config import find, param
+from texture_core.config import find
 from texture_core.types import NANOSECONDS, Array, ExplorationState, Phase, Samples, TactileSignal
 from texture_recordings.bags import BagWriter
 from texture_simulation.friction import sliding_coefficient
@@ -230,20 +229,12 @@ Logged = tuple[int, str, Any]
 class SlidePlan:
     """How each surface is explored."""
 
-    slides: int = param(10, 'Number of slides over each surface.', low=1, high=100_000)
-    speed_m_s: float = param(
-        0.1,
-        'Speed along the surface; a higher speed raises all frequencies of the signal.',
-        unit='m/s',
-        low=0.001,
-        high=1.0,
-    )
-    force_n: float = param(2.0, 'Normal force.', unit='N', low=0.05, high=20.0)
-    slide_s: float = param(3.0, 'Duration of the steady part of a slide.', unit='s', low=0.1, high=600.0)
-    direction_rad: float = param(0.0, 'Direction of travel, from +x towards +y.', unit='rad', low=-10.0, high=10.0)
-    fingers: int = param(
-        1, "Number of fingers that slide together; the topics of several are 'finger0/signal' and so on.", low=1, high=5
-    )
+    slides: int = 10  # over each surface
+    speed_m_s: float = 0.1
+    force_n: float = 2.0
+    slide_s: float = 3.0  # duration of the steady part
+    direction_rad: float = 0.0  # of travel, from +x towards +y
+    fingers: int = 1  # that slide together; the topics of several are 'finger0/signal' and so on
 
 
 def write_simulated(
@@ -268,10 +259,13 @@ def _write_surface(path: Path, scene: Scene, plan: SlidePlan, start_ns: int, rng
     with BagWriter(path) as bag:
         for number in range(1, plan.slides + 1):
             states, signals = _slide(scene, plan, start_ns, f'{path.name}/slide{number:02d}', rng)
-            streams = {topic: _running_on(batches, first, topic) for topic, batches in signals.items()}
-            for log_ns, topic, value in _in_order(states, streams):
+            logged: list[Logged] = [(state.stamp_ns, 'exploration', state) for state in states]
+            for topic, batches in signals.items():
+                logged += [(one.end_ns + DELAY_NS, topic, one) for one in _running_on(batches, first, topic)]
+            logged.sort(key=lambda one: one[0])
+            for log_ns, topic, value in logged:
                 bag.write(topic, value, log_ns)
-            start_ns = log_ns + PAUSE_NS
+            start_ns = logged[-1][0] + PAUSE_NS
     return start_ns
 
 
@@ -298,10 +292,3 @@ def _running_on(batches: Iterable[TactileSignal], first: dict[str, int], topic: 
     moved = [replace(batch, first_sample=batch.first_sample + offset) for batch in batches]
     first[topic] = moved[-1].next_sample
     return moved
-
-
-def _in_order(states: Iterable[Any], streams: dict[str, list[TactileSignal]]) -> Iterator[Logged]:
-    tracks: list[Iterable[Logged]] = [[(state.stamp_ns, 'exploration', state) for state in states]]
-    for topic, batches in streams.items():
-        tracks.append([(batch.end_ns + DELAY_NS, topic, batch) for batch in batches])
-    return heapq.merge(*tracks, key=lambda logged: logged[0])

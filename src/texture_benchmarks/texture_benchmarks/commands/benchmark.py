@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 import os
 import time
 from pathlib import Path
@@ -13,7 +12,6 @@ from pathlib import Path
 from texture_benchmarks.catalogue import BENCHMARKS, run_benchmark
 from texture_benchmarks.study import BenchmarkOptions
 from texture_core.cli import add_seed, task
-from texture_core.errors import InvalidParameter
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -28,25 +26,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help='folder of the recorded data sets (DIR/biotac20); default: $TEXTURE_DATA',
     )
     parser.add_argument('--quick', action='store_true', help='few slides, or simulated ones; not for publishing')
-    parser.add_argument(
-        '--minutes',
-        type=float,
-        default=math.inf,
-        metavar='MIN',
-        help='after which `generalisation` and `motion` end with what they have; the same command resumes them',
-    )
-    parser.add_argument('--only', default='', metavar='SET', help='data set of `generalisation`, such as `fingersense`')
     add_seed(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run one benchmark."""
-    if options.only and options.name != 'generalisation':
-        raise InvalidParameter(f"--only is '{options.only}'; `generalisation` alone has data sets to choose from")
     options.out.mkdir(parents=True, exist_ok=True)  # not only when the figures are there
-    benchmark_options = BenchmarkOptions(
-        options.out, options.data, options.seed, options.quick, 60.0 * options.minutes, options.only
-    )
+    benchmark_options = BenchmarkOptions(options.out, options.data, options.seed, options.quick)
     began_s = time.monotonic()
     with task(options.name):
         result, path = run_benchmark(options.name, benchmark_options)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Take part in a running ROS graph: stream simulated slides to the nodes, and time what they answer."""
+"""Stream simulated slides to the running nodes, and time what they answer."""
 
 from __future__ import annotations
 
@@ -8,81 +8,22 @@ import math
 import tempfile
 import threading
 import time
-from collections import Counter, defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
-from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
 
-from texture_core.errors import DeviceError
 from texture_core.ros import from_msg, to_msg
-from texture_core.ros_testing import NodeProcess
+from texture_core.ros_testing import LocalGraph, NodeProcess
 from texture_core.types import NANOSECONDS, TactileSignal, TextureEstimate
 from texture_estimation.model import load_model
 from texture_features.windows import INDEX_TOLERANCE
 from texture_recordings.bags import slide_batches
-from texture_recordings.ros import TOPICS, Topic
+from texture_recordings.ros import TOPICS
 from texture_simulation.offline import simulate_exploration
 from texture_simulation.scene import load_scene
-
-POLL_S = 0.05
-GraphT = TypeVar('GraphT', bound='Graph')
-
-
-class Graph:
-    """Take part in a ROS graph until the end of a `with` block."""
-
-    def __init__(self, domain_id: int | None = None, name: str = 'probe') -> None:
-        self._context = Context()
-        self._context.init(domain_id=domain_id)
-        self.node = Node(name, context=self._context)
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self.node)
-
-    def __enter__(self: GraphT) -> GraphT:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._executor.shutdown()
-        self.node.destroy_node()
-        self._context.try_shutdown()
-
-    def publisher(self, topic: str) -> Any:
-        """Return a publisher on a topic of the suite: 'signal', or 'finger1/signal' in a separate namespace."""
-        kind, qos, name = _in_namespace(topic)
-        return self.node.create_publisher(kind, name, qos)
-
-    def listen(self, topic: str, received: Callable[[Any], None]) -> None:
-        """Call `received` with the data class of each message of a topic, or the message itself of /diagnostics."""
-        kind, qos, name = _in_namespace(topic)
-        convert = from_msg if kind.__module__.startswith('texture_msgs') else (lambda message: message)
-        self.node.create_subscription(kind, name, lambda message: received(convert(message)), qos)
-
-    def wait_until(self, condition: Callable[[], bool], deadline_s: float, what: str) -> None:
-        """Take messages until the condition holds."""
-        deadline = time.monotonic() + deadline_s
-        while not condition():
-            if time.monotonic() > deadline:
-                raise DeviceError(f'{what}: nothing of it within {deadline_s:g} s; see the logs of the nodes')
-            self._executor.spin_once(timeout_sec=POLL_S)
-
-    def spin(self, seconds: float) -> None:
-        """Take messages for so long."""
-        end = time.monotonic() + seconds
-        while (left := end - time.monotonic()) > 0:
-            self._executor.spin_once(timeout_sec=left)
-
-
-def _in_namespace(topic: str) -> Topic:
-    namespace, _, short = topic.rpartition('/')
-    found = TOPICS[short]
-    return found._replace(name=f'{namespace}/{found.name}') if namespace else found
-
 
 SETTLE_S = 3.0  # discovery of all subscriptions
 READY_WITHIN_S = 60.0
@@ -92,59 +33,57 @@ SPEED_M_S, FORCE_N = 0.1, 2.0
 DOMAIN = 83  # separate: other nodes on the machine must not subscribe
 
 
-def measure(
-    model_path: Path, scene: str, surface: str, slide_s: float, *, seed: int, fingers: Sequence[str] = ('',)
-) -> dict[str, Any]:
-    """Stream a simulated slide to each finger, named by its namespace; return how late its estimates come.
+def measure(model_path: Path, scene: str, surface: str, slide_s: float, *, seed: int) -> dict[str, Any]:
+    """Stream a simulated slide to feature extractor and classifier; return how late the estimates come.
 
     Time of each estimate since the batch with the last sample of its newest window was published, ms; computing time
-    of the nodes, in percent of one core. The slide of each finger has the next seed.
+    of the nodes, in percent of one core.
     """
     feature_set = load_model(model_path).recipe.feature_set
     length_s, hop_s = feature_set.windows.length_s, feature_set.windows.hop_s
-    batches = {finger: dict[str, list[TactileSignal]]() for finger in fingers}
-    received = {finger: list[tuple[float, TextureEstimate]]() for finger in fingers}
-    sent_s: defaultdict[str, list[float]] = defaultdict(list)  # by topic
-    plan: list[tuple[int, str, Any]] = []  # when it is due, ns since the start; topic; data class
-    nodes: list[NodeProcess] = []
-    with Graph(DOMAIN) as graph, ExitStack() as stack:
-        # What is streamed to each finger, a state at its stamp and a batch at its end, and its two nodes.
-        for number, finger in enumerate(fingers):
-            states, signals = simulate_exploration(
-                load_scene(scene), surface, SPEED_M_S, FORCE_N, slide_s,
-                start_ns=0, exploration_id='long', rng=np.random.default_rng(seed + number),
-            )  # fmt: skip
-            plan += [(state.stamp_ns, _topic(finger, 'exploration'), state) for state in states]
-            for topic, [first, *others] in signals.items():  # one unbroken stream
-                samples = np.concatenate([first.samples, *(signal.samples for signal in others)])
-                places = np.arange(len(samples))
-                batches[finger][topic] = list(slide_batches(first, samples, places, first.stamp_ns, batch_s=BATCH_S))
-                plan += [(batch.end_ns, _topic(finger, topic), batch) for batch in batches[finger][topic]]
+
+    # What is streamed: a state at its stamp and a batch at its end.
+    states, signals = simulate_exploration(
+        load_scene(scene), surface, SPEED_M_S, FORCE_N, slide_s,
+        start_ns=0, exploration_id='long', rng=np.random.default_rng(seed),
+    )  # fmt: skip
+    batches: dict[str, list[TactileSignal]] = {}
+    for topic, [first, *others] in signals.items():  # one unbroken stream
+        samples = np.concatenate([first.samples, *(signal.samples for signal in others)])
+        batches[topic] = list(slide_batches(first, samples, np.arange(len(samples)), first.stamp_ns, batch_s=BATCH_S))
+    plan: list[tuple[int, str, Any]] = [(state.stamp_ns, 'exploration', state) for state in states]
+    plan += [(batch.end_ns, topic, batch) for topic, of_topic in batches.items() for batch in of_topic]
+    plan.sort(key=lambda timed: timed[0])
+    messages = [(due_ns, topic, to_msg(value)) for due_ns, topic, value in plan]
+
+    received: list[tuple[float, TextureEstimate]] = []
+    sent_s: dict[str, list[float]] = {topic: [] for _, topic, _ in plan}
+    with LocalGraph(DOMAIN, READY_WITHIN_S + slide_s) as graph, ExitStack() as stack:
+        nodes = [
+            stack.enter_context(NodeProcess(package, node, given))
             for package, node, given in (
                 ('texture_features', 'feature_extractor', {'recipe': str(model_path.with_suffix('.json'))}),
                 ('texture_estimation', 'classifier', {'model': str(model_path)}),
-            ):
-                process = NodeProcess(package, node, given, namespace=f'/{finger}', domain_id=DOMAIN)
-                nodes.append(stack.enter_context(process))
-            graph.listen(
-                _topic(finger, 'texture'),
-                lambda estimate, found=received[finger]: found.append((time.perf_counter(), estimate)),
             )
-        plan.sort(key=lambda timed: timed[0])
-        publishers = {topic: graph.publisher(topic) for _, topic, _ in plan}
-        messages = [(due_ns, topic, to_msg(value)) for due_ns, topic, value in plan]
+        ]
+        graph.peer.create_subscription(
+            TOPICS['texture'].type,
+            'texture',
+            lambda message: received.append((time.perf_counter(), from_msg(message))),
+            TOPICS['texture'].qos,
+        )
+        publishers = {
+            topic: graph.peer.create_publisher(TOPICS[topic].type, topic, TOPICS[topic].qos) for topic in sent_s
+        }
 
-        # Wait until each node subscribes to the streams, and each classifier is discovered.
-        needed = [_topic(finger, topic) for finger in fingers for topic in ('exploration', *feature_set.topics)]
+        # Wait until the extractor subscribes to the streams, and the classifier is discovered.
+        needed = ('exploration', *feature_set.topics)
+        graph.until(lambda: all(publishers[topic].get_subscription_count() for topic in needed))
+        graph.until(lambda: graph.peer.count_publishers('texture'))
+        settled_s = time.monotonic() + SETTLE_S
+        graph.until(lambda: time.monotonic() > settled_s)
 
-        def ready() -> bool:
-            heard = all(publishers[topic].get_subscription_count() for topic in needed)
-            return heard and all(graph.node.count_publishers(_topic(finger, 'texture')) for finger in fingers)
-
-        graph.wait_until(ready, READY_WITHIN_S * len(fingers), 'the feature extractors and classifiers')
-        graph.spin(SETTLE_S)
-
-        # Stream from a separate thread until each finger has its final estimate.
+        # Stream from a separate thread until the final estimate.
         def publish() -> None:
             start_s = time.perf_counter()
             for due_ns, topic, message in messages:
@@ -154,43 +93,29 @@ def measure(
                 sent_s[topic].append(time.perf_counter())
                 publishers[topic].publish(message)
 
-        def ended() -> bool:
-            return all(found and found[-1][1].final for found in received.values())
-
         before_s, began_s = [node.cpu_s() for node in nodes], time.monotonic()
         streamer = threading.Thread(target=publish, name='streamer')
         streamer.start()
-        graph.wait_until(ended, slide_s + READY_WITHIN_S, 'the final estimates')
+        graph.until(lambda: received and received[-1][1].final)
         lasted_s = time.monotonic() - began_s
         streamer.join()
-        cpu: Counter[str] = Counter()
-        for node, used_s in zip(nodes, before_s, strict=True):
-            cpu[node.name] += (node.cpu_s() - used_s) / lasted_s
+        cpu = {node.name: (node.cpu_s() - used_s) / lasted_s for node, used_s in zip(nodes, before_s, strict=True)}
     latency_ms = 1000 * np.array(
         [
-            at_s
-            - max(
-                sent_s[_topic(finger, topic)][_last_batch(batches[finger][topic], estimate, length_s)]
-                for topic in feature_set.topics
-            )
-            for finger in fingers
-            for at_s, estimate in received[finger]
+            at_s - max(sent_s[topic][_last_batch(batches[topic], estimate, length_s)] for topic in feature_set.topics)
+            for at_s, estimate in received
             if not estimate.final
         ]
     )
     median, p99 = np.percentile(latency_ms, (50, 99)).tolist()
     return {
         'estimates': len(latency_ms),
-        'expected': len(fingers) * (math.floor((slide_s - length_s) / hop_s + 1e-6) + 1),
+        'expected': math.floor((slide_s - length_s) / hop_s + 1e-6) + 1,
         'median_ms': median,
         'p99_ms': p99,
         'longest_ms': float(latency_ms.max()),
-        'cpu_percent': {name: round(100 * load, 1) for name, load in [*cpu.items(), ('all', cpu.total())]},
+        'cpu_percent': {name: round(100 * load, 1) for name, load in [*cpu.items(), ('all', sum(cpu.values()))]},
     }
-
-
-def _topic(finger: str, name: str) -> str:
-    return f'{finger}/{name}' if finger else name
 
 
 def driver_cpu() -> float:
@@ -198,17 +123,16 @@ def driver_cpu() -> float:
     with tempfile.TemporaryDirectory() as folder:
         device = str(Path(folder) / 'tsf85')
         emulated = {'sensor_link': device, 'finger_pipe': str(Path(folder) / 'finger')}
-        received: list[TactileSignal] = []
         with (
-            Graph(DOMAIN) as graph,
-            NodeProcess('texture_simulation', 'emulator', emulated, domain_id=DOMAIN),
-            NodeProcess('texture_drivers', 'sensor', {'device': device}, domain_id=DOMAIN) as sensor,
+            LocalGraph(DOMAIN, READY_WITHIN_S) as graph,
+            NodeProcess('texture_simulation', 'emulator', emulated),
+            NodeProcess('texture_drivers', 'sensor', {'device': device}) as sensor,
         ):
-            graph.listen('signal', received.append)
-            graph.wait_until(lambda: len(received) > 100, READY_WITHIN_S, 'the signal of the sensor node')
-            before, began = sensor.cpu_s(), time.monotonic()
-            graph.spin(DRIVER_S)
-            return (sensor.cpu_s() - before) / (time.monotonic() - began)
+            received = graph.listen(TOPICS['signal'].type, 'signal', TOPICS['signal'].qos)
+            graph.until(lambda: len(received) > 100)
+            before_s, began_s = sensor.cpu_s(), time.monotonic()
+            graph.until(lambda: time.monotonic() > began_s + DRIVER_S)
+            return (sensor.cpu_s() - before_s) / (time.monotonic() - began_s)
 
 
 def _last_batch(batches: Sequence[TactileSignal], estimate: TextureEstimate, length_s: float) -> int:

@@ -18,19 +18,17 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
-from unittest import mock
 
 import numpy as np
 from geometry_msgs.msg import TwistStamped, WrenchStamped
 
-from texture_benchmarks.ros.graph import Graph
 from texture_benchmarks.study import BenchmarkResult
-from texture_bringup.demo import free_domain, isolated
+from texture_bringup.demo import free_domain
 from texture_bringup.operator import Operator
 from texture_core.errors import LaunchFailed, TextureError
 from texture_core.ros import to_ns
-from texture_core.ros_testing import NodeProcess
-from texture_core.types import NANOSECONDS, ExplorationRequest, ExplorationState, Phase
+from texture_core.ros_testing import LocalGraph, NodeProcess
+from texture_core.types import NANOSECONDS, Array, ExplorationRequest, ExplorationState, Phase
 from texture_evaluation.train import train_from_bags
 from texture_exploration.safety import SafetyLimits
 from texture_simulation.offline import SlidePlan, write_simulated
@@ -85,8 +83,8 @@ PACKAGES = {
     'explorer': 'texture_exploration',
 }
 # Patient with a busy machine; what comes 0.5 s late is too late all the same.
-PATIENT = {'connect_timeout_s': 10.0, 'deadman_s': 0.4, 'approach_timeout_s': 60.0}
-NOT_LATE = {'state_timeout_s': 1.0, 'signal_timeout_s': 1.0}
+PATIENT = {'connect_timeout_s': 10.0, 'deadman_s': 0.4, 'approach_timeout_s': 60.0,
+           'state_timeout_s': 1.0, 'signal_timeout_s': 1.5}  # fmt: skip
 PATCH = {'patch_x_low_m': -0.02, 'patch_x_high_m': 0.1, 'patch_y_low_m': -0.05, 'patch_y_high_m': 0.05}
 EMULATED = {'accept_no_timeout': True, 'accept_shared_group': True, 'approach_stiffness_n_m': 2e4}
 RESPAWNED = ('sensor', 'feature_extractor', 'classifier')  # what moves a robot, no launch file starts again
@@ -140,46 +138,49 @@ def check(trials: Sequence[FaultTrial], ended: int) -> dict[str, Any]:
 # The run.
 
 
-class Rig(Graph):
+class Rig(LocalGraph):
     """All nodes as processes, an operator who explores with them, and injected faults; use it in a `with` block."""
 
     def __init__(self, domain_id: int, given: Mapping[str, Mapping[str, Any]]) -> None:
-        super().__init__(domain_id, 'watcher')
-        self._domain_id, self._given, self._nodes = domain_id, given, dict[str, NodeProcess]()
+        super().__init__(domain_id, math.inf)
+        self._given, self._nodes, self._over = given, dict[str, NodeProcess](), threading.Event()
         self._operator, self._other = Operator(domain_id=domain_id), Operator(domain_id=domain_id)
         self.ended = 0  # nodes that ended by themselves
-        self._forces: list[tuple[float, float]] = []
-        self.node.create_subscription(WrenchStamped, 'true_wrench', self._on_wrench, 1000)
-        self._thread = threading.Thread(target=self._executor.spin, daemon=True)
+
+    def __enter__(self) -> Rig:
+        super().__enter__()
+        self._wrenches = self.listen(WrenchStamped, 'true_wrench', 1000)
+        self._thread = threading.Thread(target=self.until, args=(self._over.is_set,))
         self._thread.start()
+        return self
 
     def __exit__(self, *_: object) -> None:
         for name in reversed(self._nodes):  # the explorer first, which lifts the finger
             self._nodes[name].stop()
         for operator in (self._operator, self._other):
             operator.__exit__(None, None, None)
-        self._executor.shutdown()
+        self._over.set()
         self._thread.join()
         super().__exit__()
 
-    def _on_wrench(self, wrench: WrenchStamped) -> None:
-        force = wrench.wrench.force
-        self._forces.append((to_ns(wrench.header.stamp) / NANOSECONDS, math.hypot(force.x, force.y, force.z)))
+    def _forces(self) -> Array:
+        """Return times, s, and true forces on the finger, N, since the exploration began, (n, 2)."""
+        forces = [(one.header.stamp, one.wrench.force) for one in self._wrenches]
+        return np.array([(to_ns(stamp) / NANOSECONDS, math.hypot(one.x, one.y, one.z)) for stamp, one in forces])
 
     def start(self, name: str, more: Mapping[str, Any] = {}) -> None:
         """Start a node, again if it runs; wait until an explorer answers, which it cannot do while it connects."""
         if name in self._nodes:
             self._nodes[name].stop()
-        given = {**self._given[name], **more}
-        node = self._nodes[name] = NodeProcess(PACKAGES[name], name, given, domain_id=self._domain_id)
+        node = self._nodes[name] = NodeProcess(PACKAGES[name], name, {**self._given[name], **more})
         node.__enter__()
         deadline_s = time.monotonic() + ANSWERS_S
-        while name == 'explorer' and time.monotonic() < deadline_s:
+        while name == 'explorer':
             with suppress(LaunchFailed):  # an answer to a client that is not discovered yet is lost
                 self._operator.stop()
                 return
-        if name == 'explorer':
-            raise LaunchFailed(f'the explorer does not answer within {ANSWERS_S:g} s: {node.output}')
+            if time.monotonic() > deadline_s:
+                raise LaunchFailed(f'the explorer does not answer within {ANSWERS_S:g} s: {node.output}')
 
     def run(self, name: str, surface: str) -> FaultTrial:
         """Explore a surface with a fault, put right what it left, and wait until all works again."""
@@ -189,22 +190,22 @@ class Rig(Graph):
             self._nodes['explorer'].stop()
             self.start('twist_controller', fault.given)  # with its finger where all began
             self.start('explorer')
-        self._forces, began_s = [], time.monotonic()
+        self._wrenches.clear()
+        began_s = time.monotonic()
         explored = self._explore(fault, surface)
         took_s = time.monotonic() - began_s
         time.sleep(SETTLED_S)
-        forces = self._forces
-        left_n = forces[-1][1]
+        times_s, forces_n = self._forces().T
+        left_n = float(forces_n[-1])
         # As an operator does after a fault: put the arm right, and lift the finger by another explorer.
         if fault.action == 'start' or not fault.obeys:
             self._other.set_parameters('twist_controller', HARMLESS)
             self.start('explorer')
             self._other.call('explorer/lift', 'start the explorer')
             time.sleep(SETTLED_S)
-            left_n = left_n if fault.obeys else self._forces[-1][1]
+            left_n = left_n if fault.obeys else float(self._forces()[-1, 1])
         self.ended += sum(node.process.poll() is not None for node in self._nodes.values())
         self._other.wait_for_signal(BACK_S)
-        times_s, forces_n = np.transpose(forces)
         above_s = float(np.diff(times_s)[forces_n[:-1] > LIMIT_N].sum())
         return FaultTrial(name, *explored, took_s, float(forces_n.max()), above_s, left_n)
 
@@ -257,14 +258,14 @@ class Rig(Graph):
 
     def _command(self, end_s: float) -> None:
         """Also command the arm, along the surface."""
-        publisher = self.node.create_publisher(TwistStamped, 'twist_controller/twist', 1)
+        publisher = self.peer.create_publisher(TwistStamped, 'twist_controller/twist', 1)
         twist = TwistStamped()
         twist.header.frame_id, twist.twist.linear.y = 'base', 0.01
         while time.monotonic() < end_s:
-            twist.header.stamp = self.node.get_clock().now().to_msg()
+            twist.header.stamp = self.peer.get_clock().now().to_msg()
             publisher.publish(twist)
             time.sleep(POLL_S)
-        self.node.destroy_publisher(publisher)
+        self.peer.destroy_publisher(publisher)
 
 
 def soak(
@@ -288,9 +289,8 @@ def soak(
             'twist_controller': {'finger_pipe': pipe, 'start_height_m': 0.002, 'command_timeout_s': 0.0},
             'feature_extractor': {'recipe': card},
             'classifier': {'model': card},
-            'explorer': {'arm': 'ros_controllers', **PATIENT, **NOT_LATE, **PATCH, **EMULATED},
+            'explorer': {'arm': 'ros_controllers', **PATIENT, **PATCH, **EMULATED},
         }
-        stack.enter_context(mock.patch.dict(os.environ, isolated(domain_id, os.environ)))
         running = stack.enter_context(Rig(domain_id, given))
         for name in PACKAGES:
             running.start(name)
@@ -311,7 +311,6 @@ def soak(
         split='none: one run; the model is trained on simulated slides',
         numbers={
             'seed': seed,
-            'duration_s': duration_s,
             'requirements': check(trials, running.ended),
             'trials': [one._asdict() for one in trials],
         },

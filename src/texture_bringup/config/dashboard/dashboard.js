@@ -1,3 +1,5 @@
+// SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
+// SPDX-License-Identifier: Apache-2.0
 'use strict';
 
 const RETRY_MS = 1000;

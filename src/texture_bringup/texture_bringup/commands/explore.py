@@ -8,9 +8,8 @@ import argparse
 import json
 import logging
 import math
+import os
 import shutil
-import signal
-import subprocess
 import sys
 import tempfile
 import time
@@ -23,6 +22,8 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
+from texture_bringup.feed import roughness_text, texture_text
+from texture_bringup.launcher import Child
 from texture_bringup.operator import ExplorationResult, Operator, Progress
 from texture_core.cli import USER_ERROR, Command, add_namespace, add_parameters, parameters_from
 from texture_core.config import find
@@ -34,25 +35,11 @@ from texture_core.errors import (
     MotionAborted,
     MotionRefused,
 )
-from texture_core.types import (
-    ExplorationRequest,
-    ExplorationState,
-    RoughnessEstimate,
-    TextureEstimate,
-)
+from texture_core.types import ExplorationRequest, ExplorationState, TextureEstimate
 from texture_estimation.model import load_model
 from texture_estimation.next_motion import slide_values
+from texture_evaluation import collection
 from texture_evaluation.check import check_finger, store_reference
-from texture_evaluation.collection import (
-    CollectionEnd,
-    CollectionParams,
-    Patch,
-    PlaceAccuracy,
-    PlacePlan,
-    evaluate_places,
-    next_bag,
-)
-from texture_evaluation.collection import collect as collect_places
 from texture_exploration.motions import MOTIONS
 from texture_exploration.presets import load_preset
 from texture_features.correction import read_reference
@@ -69,7 +56,6 @@ NUMBERS = (
     ('turns', 'turns', 'N', 'turns, if the motion has some'),
     ('duration', 'duration_s', 'S', 'duration of an in-hand slide'),
 )
-UNLIKE = 'it resembles no trained texture'
 BAR = 24
 TIMEOUT_S = 300.0
 EXPLORER_S, SOON_S = 5.0, 1.0  # within which an explorer that runs is discovered, at most and usually
@@ -115,21 +101,23 @@ def _configure_explore(parser: argparse.ArgumentParser) -> None:
 
 
 def _explore(options: argparse.Namespace) -> int:
-    """Explore once in each direction, until one has no success; return the worst end, see `exit_code`."""
+    """Explore once in each direction, until one has no success; return that, else the worst end, see `exit_code`."""
     requests, made, code = requests_of(options), 0, 0
     try:
         with Operator(options.namespace) as operator:
             operator.wait_for_explorer(EXPLORER_S, SOON_S)
             for request in requests:
                 result = explored(operator.explore, request)
-                code = max(code, exit_code(result))
                 if options.json:
                     print(json.dumps(as_json(result)), flush=True)
                 else:
                     print_result(result)
                 if not result.success:
-                    break
-                made += 1
+                    return exit_code(result)
+                made, code = made + 1, max(code, exit_code(result))
+    except MotionAborted as error:  # the explorer does not answer any more: it may have moved
+        print(f'texture: {error}', file=sys.stderr)
+        return ABORTED
     finally:
         if made < len(requests) > 1:
             print(f'{made} of {len(requests)} slides were made', file=sys.stderr)
@@ -229,29 +217,7 @@ def show_progress(state: ExplorationState, texture: TextureEstimate) -> None:
         return
     fraction = state.progress if state.progress >= 0 else 0.0
     bar = '█' * round(BAR * fraction)
-    print(f'\r{state.phase.value:<9}|{bar:<{BAR}}| {progress_text(texture):<60}', end='', file=sys.stderr, flush=True)
-
-
-def texture_text(estimate: TextureEstimate) -> str:
-    """Return a texture estimate as text, with the reason if it is rejected."""
-    if not estimate.label or estimate.accepted:
-        return progress_text(estimate)
-    return f'{progress_text(estimate)}: {estimate.message or UNLIKE}'
-
-
-def progress_text(estimate: TextureEstimate) -> str:
-    """Return a texture estimate as text that fits the progress line."""
-    if not estimate.label:
-        return estimate.message or 'none yet'
-    nearest = f'{estimate.label}, confidence {estimate.confidence:.2f} after {estimate.evidence_s:.1f} s'
-    return nearest if estimate.accepted else f'unknown (nearest: {nearest})'
-
-
-def roughness_text(estimate: RoughnessEstimate) -> str:
-    """Return a roughness estimate as text."""
-    if not estimate.valid:
-        return estimate.message
-    return f'{estimate.grade:.1f} ± {estimate.grade_std:.1f} on the scale from 1 (smooth) to 5 (rough)'
+    print(f'\r{state.phase.value:<9}|{bar:<{BAR}}| {texture_text(texture):<60.60}', end='', file=sys.stderr, flush=True)
 
 
 # --------------------
@@ -313,7 +279,6 @@ def _identify(options: argparse.Namespace) -> int:
 # Collect slides of a surface.
 
 RECIPE = 'default'  # whose features distinguish the places
-RECORDER_S = 30.0  # to start, and to complete the bag
 FLUSHED_S = 20.0  # within which what was recorded can be read: a recorder may be behind
 RECORDED = ('signal', 'exploration')
 PATCH = ('patch_x_low_m', 'patch_x_high_m', 'patch_y_low_m', 'patch_y_high_m')
@@ -323,8 +288,8 @@ BAGS_LOG = logging.getLogger('texture_recordings.bags')
 
 
 def collect_surface(
-    operator: Operator, surface: str, folder: Path, params: CollectionParams, namespace: str = ''
-) -> tuple[CollectionEnd, Path | None]:
+    operator: Operator, surface: str, folder: Path, params: collection.CollectionParams, namespace: str = ''
+) -> tuple[collection.CollectionEnd, Path | None]:
     """Collect a surface; return how it ended, and the bag, which is complete however that was, Ctrl-C included.
 
     A bag without any slide is removed; then None is returned instead.
@@ -335,10 +300,10 @@ def collect_surface(
             'no surface patch is taught: touch the corners of the surface with `texture touch-surface`, or give the '
             f'explorer {", ".join(PATCH)}'
         )
-    patch = Patch(low_x, high_x, low_y, high_y)
-    plan = PlacePlan(surface, params, patch, (low_n, high_n), (LEAST_SPEED_M_S, high_m_s))
+    patch = collection.Patch(low_x, high_x, low_y, high_y)
+    plan = collection.PlacePlan(surface, params, patch, (low_n, high_n), (LEAST_SPEED_M_S, high_m_s))
     folder.mkdir(parents=True, exist_ok=True)
-    bag = folder / next_bag([one.name for one in folder.iterdir()], surface)
+    bag = folder / collection.next_bag([one.name for one in folder.iterdir()], surface)
     with recorder(operator, bag, namespace) as check:
 
         def explore(request: ExplorationRequest) -> tuple[ExplorationError, str]:
@@ -349,7 +314,7 @@ def collect_surface(
                 return error.error, str(error)
             return explored.error, explored.message
 
-        end = collect_places(plan, params, explore, partial(_evaluate_bag, bag, surface), _print_progress)
+        end = collection.collect(plan, params, explore, partial(_evaluate_bag, bag, surface), _print_progress)
     # Where the recorder has ended, the bag there may be another one.
     if end.slides or end.error is CollectionError.NOT_RECORDED:
         return end, bag
@@ -363,7 +328,7 @@ def _print_progress(sentence: str, slides: int) -> None:
     print(f'{slides} slides: {sentence}', flush=True)
 
 
-def _evaluate_bag(bag: Path, surface: str, slides: int) -> PlaceAccuracy:
+def _evaluate_bag(bag: Path, surface: str, slides: int) -> collection.PlaceAccuracy:
     """Evaluate all bags of the folder, once the newest one has `slides` slides on the disk."""
     feature_set = FeatureSet.load(RECIPE)
     deadline_s = time.monotonic() + FLUSHED_S
@@ -376,7 +341,7 @@ def _evaluate_bag(bag: Path, surface: str, slides: int) -> PlaceAccuracy:
             BAGS_LOG.disabled = False
         written = sum(one.bag == bag for one in dataset)
         if written >= slides or time.monotonic() > deadline_s:
-            return evaluate_places(dataset.features(feature_set), surface)
+            return collection.evaluate_places(dataset.features(feature_set), surface)
 
 
 @contextmanager
@@ -384,30 +349,16 @@ def recorder(operator: Operator, bag: Path, namespace: str) -> Iterator[Callable
     """Record a bag in a separate process; the function raises InvalidData, with its last message, if that ended."""
     operator.wait_for_listeners(RECORDED, 1, lambda: None)  # the feature extractor; by then all others are found
     wanted = {topic: operator.listeners(topic) + 1 for topic in RECORDED}
-    command = [sys.executable, '-m', 'texture_bringup.command', 'record', str(bag), '--namespace', namespace]
-    with tempfile.TemporaryFile('w+') as output:
-        process = subprocess.Popen(command, stdout=output, stderr=output, start_new_session=True)
-
-        def last_message() -> str:
-            output.seek(0)
-            return output.read().strip().rpartition('\n')[2]
+    arguments = ['record', str(bag), '--namespace', namespace]
+    with tempfile.TemporaryDirectory() as log, Child(arguments, os.environ, Path(log) / 'record.log') as child:
 
         def check() -> None:
-            if process.poll() is not None:
-                raise InvalidData(f'the recorder ended: {last_message()}')
+            if child.end:
+                raise InvalidData(f'the recorder ended: {child.end}')
 
-        try:
-            for topic, number in wanted.items():
-                operator.wait_for_listeners((topic,), number, check)
-            yield check
-        finally:
-            if process.poll() is None:
-                process.send_signal(signal.SIGINT)
-            try:
-                process.wait(RECORDER_S)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+        for topic, number in wanted.items():
+            operator.wait_for_listeners((topic,), number, check)
+        yield check
 
 
 # Parameters whose options are shorter; both numbers of a range follow one option.
@@ -421,7 +372,7 @@ def _configure_collect(parser: argparse.ArgumentParser) -> None:
     speed, force = 'speeds of the slides, m/s (default: 0.02 to 0.05)', 'normal forces, N (default: 1 to 2)'
     parser.add_argument('--speed', help=f'{speed}, as far as the explorer allows', **shape)
     parser.add_argument('--force', help=f'{force}, or the lowest that the explorer allows to twice that', **shape)
-    add_parameters(parser, CollectionParams, without=SHORTER)
+    add_parameters(parser, collection.CollectionParams, without=SHORTER)
     parser.add_argument(
         '--distance', type=float, default=0.04, metavar='M', help='length of each slide (default: 0.04)'
     )
@@ -431,7 +382,7 @@ def _configure_collect(parser: argparse.ArgumentParser) -> None:
 def _collect(options: argparse.Namespace) -> int:
     """Collect, and report how well left-out places are recognised; return 0 if the bound is met, else 1."""
     given = dict(zip(SHORTER, (options.distance, *options.speed, *options.force), strict=True))
-    params = parameters_from(options, CollectionParams, given)
+    params = parameters_from(options, collection.CollectionParams, given)
     with Operator(options.namespace) as operator:
         operator.wait_for_explorer(EXPLORER_S, SOON_S)
         end, bag = collect_surface(operator, options.surface, options.folder, params, options.namespace)

@@ -128,7 +128,7 @@ def _configure_set(parser: argparse.ArgumentParser) -> None:
 def _set(options: argparse.Namespace) -> int:
     values = given_arguments(options.values)
     with Operator(options.namespace) as operator:
-        operator.set_from_texts(options.node, values)
+        operator.set_parameters(options.node, values)
     print(f'{options.node}: ' + ', '.join(f'{name} is {text}' for name, text in values.items()))
     return 0
 

@@ -33,17 +33,13 @@ def _configure_launch(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('file', help="path of a launch file, or the name of one of the suite's, such as emulator")
     parser.add_argument('arguments', nargs='*', default=[], metavar='NAME:=VALUE', help='arguments of the launch file')
     parser.add_argument('--parent', type=int, help=argparse.SUPPRESS)
-    parser.add_argument(
-        '--together',
-        action='store_true',
-        help='stop all nodes when one dies; otherwise it is started again if it may be',
-    )
     parser.add_argument('--show-args', action='store_true', help='show the arguments of the launch file')
 
 
 def _launch(options: argparse.Namespace) -> int:
     """Run the nodes until they end or Ctrl-C; return 2 if a needed one was started wrongly, 1 if one died, else 0."""
-    if options.parent is not None:
+    child = options.parent is not None  # of a program that needs all nodes: it and they end together
+    if child:
         end_with(options.parent, signal.SIGINT)
     path = find_launch_file(options.file)
     if options.show_args:
@@ -52,7 +48,7 @@ def _launch(options: argparse.Namespace) -> int:
     given = given_arguments(options.arguments)
     nodes = read(path, given, os.environ)
     refuse_wrong(nodes, set(given.values()))
-    return Supervisor(nodes, _say, together=options.together).run()
+    return Supervisor(nodes, _say, together=child).run()
 
 
 # What a node would refuse, by its program: the parameters of which all are looked at if one of them was given.
@@ -149,14 +145,12 @@ def _configure_demo(parser: argparse.ArgumentParser) -> None:
 
 def _demo(options: argparse.Namespace) -> int:
     """Run the demonstration; return 1 if an answer was not as expected."""
-    from texture_bringup.demo import ProgressLog, demonstrate
+    from texture_bringup.demo import demonstrate, line
     from texture_estimation.recipe import load_recipe
 
     load_recipe(options.recipe)  # refused before the nodes start
-    progress = ProgressLog()
-    progress.line('Everything physical in this demonstration is simulated: surfaces, arm and sensor.')
-    right = demonstrate(options.out, options.recipe, options.seed, progress, dashboard=options.dashboard)
-    return 0 if right else 1
+    line('Everything physical in this demonstration is simulated: surfaces, arm and sensor.')
+    return 0 if demonstrate(options.out, options.recipe, options.seed, dashboard=options.dashboard) else 1
 
 
 launch = Command('start the nodes of a launch file', _configure_launch, _launch)

@@ -101,8 +101,8 @@ def picture(frame: Frame, peak: float) -> Group:
     faults = [light for light in frame['lights'] if light['colour'] not in ('green', 'grey')]
     return Group(
         rows,
-        Text(f'texture    {texture_text(texture)}', style=f'bold {style}'),
-        *([Text(f'roughness  {grade}')] if (grade := roughness_text(roughness)) else []),
+        Text(f'texture    {texture["text"]}', style=f'bold {style}'),
+        *([Text(f'roughness  {roughness["text"]}')] if roughness['text'] else []),
         *(Text(f'{light["name"]}: {light["message"]}', style=light['colour']) for light in faults),
     )
 
@@ -136,10 +136,8 @@ def line(frame: Frame) -> str:
     """Return a frame as one line."""
     signal, state, texture = frame['signal'], frame['state'], frame['texture']
     level = f'level {signal["level"]:.3g} {signal["unit"]}' if signal['level'] is not None else 'no samples'
-    words = [f'{state["phase"]:<9}', finger_text(state), level, texture_text(texture)]
-    if frame['roughness']['valid']:
-        words.append(f'roughness {roughness_text(frame["roughness"])}')
-    return ' | '.join(words)
+    roughness = f'roughness {frame["roughness"]["text"]}' if frame['roughness']['valid'] else ''
+    return ' | '.join(filter(None, [f'{state["phase"]:<9}', finger_text(state), level, texture['text'], roughness]))
 
 
 def finger_text(state: Mapping[str, Any]) -> str:
@@ -151,20 +149,3 @@ def finger_text(state: Mapping[str, Any]) -> str:
     ]
     error = ExplorationError(state['error_code']).name.lower().replace('_', ' ') if state['error_code'] else ''
     return '  '.join([*numbers, *filter(None, [state['motion'], error])]) or 'no exploration'
-
-
-def texture_text(texture: Mapping[str, Any]) -> str:
-    """Return the estimate of a frame as text: the label and whether it is accepted, or why there is none."""
-    if not texture['label']:
-        return str(texture['message'] or texture['missing'] or 'none yet')
-    verdict = 'accepted' if texture['accepted'] else f'rejected: {texture["rejection"]}'
-    confidence = '' if texture['confidence'] is None else f', confidence {texture["confidence"]:.2f}'
-    decided = ', decided' if texture['decided'] else ''
-    return f'{texture["label"]}{confidence} after {texture["evidence_s"]:.1f} s, {verdict}{decided}'
-
-
-def roughness_text(roughness: Mapping[str, Any]) -> str:
-    """Return the roughness of a frame as text."""
-    if not roughness['valid']:
-        return str(roughness['message'])
-    return f'{roughness["grade"]:.1f} on the scale from 1 (smooth) to 5 (rough)'

@@ -26,13 +26,7 @@ from texture_bringup.feed import FRAME_PERIOD_S, Feed
 from texture_bringup.operator import Operator, subscribe
 from texture_core.config import folder, from_mapping, param
 from texture_core.errors import InvalidData, InvalidParameter, LaunchFailed
-from texture_core.ros import (
-    DiagnosticReport,
-    Diagnostics,
-    declare,
-    quality_of_service,
-    run,
-)
+from texture_core.ros import DiagnosticReport, Diagnostics, declare, quality_of_service, run
 from texture_core.types import ExplorationRequest, checked_label
 from texture_features.correction import read_reference
 

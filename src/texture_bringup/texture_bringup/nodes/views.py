@@ -7,7 +7,6 @@ from __future__ import annotations
 import array
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,11 +20,11 @@ from texture_msgs import msg
 from visualization_msgs.msg import Marker
 
 from texture_bringup.feed import places_of
-from texture_core.config import param
 from texture_core.errors import TextureError
-from texture_core.ros import SENSOR_QOS, STATE_QOS, DiagnosticReport, Diagnostics, declare, from_msg, run, to_stamp
+from texture_core.ros import SENSOR_QOS, STATE_QOS, DiagnosticReport, Diagnostics, from_msg, run, to_stamp
 from texture_core.types import NANOSECONDS, ExplorationState, Phase, TactileSignal
 
+MAX_RATE_HZ = 2500.0  # messages a second of the curve, which plots of other programs keep up with
 PATH_S = 0.2  # how often the path is drawn anew
 PATH_POINTS = 5000
 PATH_WIDTH_M = 0.001
@@ -38,26 +37,13 @@ VIEW_QOS = QoSProfile(depth=1000)
 VIEW_TYPES: Mapping[str, type] = {'signal': msg.SignalSample, 'taxels': Image, 'wrench': WrenchStamped, 'path': Marker}
 
 
-@dataclass(frozen=True)
-class ViewsParams:
-    """Parameters of the views."""
-
-    max_rate_hz: float = param(
-        2500.0,
-        'Messages a second of the curve at most; a faster signal is drawn by its lowest and highest value in turn.',
-        unit='Hz',
-        low=10.0,
-        high=20_000.0,
-    )
-
-
-def curve(batch: TactileSignal, max_rate_hz: float) -> Iterator[tuple[int, NDArray[np.float32]]]:
+def curve(batch: TactileSignal) -> Iterator[tuple[int, NDArray[np.float32]]]:
     """Yield time, ns, and value of each channel, (n_channels,), of the points by which a batch is drawn.
 
-    They are its samples or, where these are more than `max_rate_hz`, the lowest and the highest of as many samples as
+    They are its samples or, where these are more than MAX_RATE_HZ, the lowest and the highest of as many samples as
     needed, at a spacing of half of these samples.
     """
-    step = 2 * math.ceil(batch.sampling_rate_hz / max_rate_hz) if batch.sampling_rate_hz > max_rate_hz else 1
+    step = 2 * math.ceil(batch.sampling_rate_hz / MAX_RATE_HZ) if batch.sampling_rate_hz > MAX_RATE_HZ else 1
     starts = np.arange(0, len(batch.samples), step)
     rows = batch.samples
     if step > 1:
@@ -92,7 +78,6 @@ class Views(Node):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('views', **kwargs)
-        self._params = declare(self, ViewsParams)
         self._points: list[Point] = []
         self._powers: list[float] = []
         self._power = 0.0  # of the newest batch
@@ -131,7 +116,7 @@ class Views(Node):
         return on_message
 
     def _draw(self, batch: TactileSignal) -> None:
-        for time_ns, row in curve(batch, self._params.max_rate_hz):
+        for time_ns, row in curve(batch):
             header = Header(stamp=to_stamp(time_ns), frame_id=batch.frame_id)
             self._curve.publish(msg.SignalSample(header=header, values=array.array('f', row.tobytes())))
 

@@ -45,7 +45,8 @@ class ArmState:
     the direction of travel, NaN if the arm does not measure it or the finger does not slide. `fault` says why the arm
     cannot move; '' if it can. Without further commands the arm keeps its last velocity for `watchdog_s` at most; 0 if
     unknown. `delay_s` passes from a force to the motion that responds to it. `unsafe` says why the finger must be
-    lifted although the arm obeys; '' if it need not.
+    lifted although the arm obeys; '' if it need not. `place_ns` is when it was at `position`, by any clock; 0 if that
+    was at `time_ns`.
     """
 
     time_ns: int
@@ -58,6 +59,7 @@ class ArmState:
     along_n: tuple[float, float] = (math.nan, math.nan)
     unsafe: str = ''
     delay_s: float = 0.0
+    place_ns: int = 0
 
     @property
     def force_vector_n(self) -> Vector:

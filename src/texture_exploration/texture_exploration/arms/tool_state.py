@@ -203,6 +203,7 @@ class ToolState:
         self.listening = WITHOUT_GAPS
         self.rotation: Array = np.eye(3)  # of the tool in the base frame
         self._position: Vector = (math.nan, math.nan, math.nan)
+        self._place_ns = 0
         self._velocity = REST
         self._force_n = math.nan
         self._force_vector_n: Vector = (math.nan, math.nan, math.nan)  # zeroed, not smoothed
@@ -222,7 +223,8 @@ class ToolState:
             self.rotation = quaternion_matrix(sample.rotation)
             self._position = self._frame.place(sample.position_m)
             self.rest.update(now_ns, self._position)
-            self._update_velocity(sample.stamp_ns or now_ns)
+            self._place_ns = sample.stamp_ns or now_ns
+            self._update_velocity(self._place_ns)
 
     def take_force(self, now_ns: int, sample: ForceSample, *, moving: bool) -> None:
         """Take a force that came at `now_ns`, after the pose of that time; `moving` if the arm is commanded to move."""
@@ -264,6 +266,7 @@ class ToolState:
             tangential_force_n=tangential_force_n(self._force_vector_n, self._velocity),
             along_n=self._force_vector_n[:2],
             delay_s=self._params.loop_delay_s + self._params.force_smoothing_s,
+            place_ns=self._place_ns,
         )
 
     @property

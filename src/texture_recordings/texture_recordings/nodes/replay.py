@@ -70,10 +70,7 @@ class ReplayParams:
     slides: str = param('', "Which slides of each surface are published, such as '1-30'; '' takes the whole recording.")
     from_namespace: str = param('', "Namespace in the bag to publish; '' if it has but one.")
     subscribers: int = param(
-        1,
-        "Number of subscribers that 'signal', 'exploration' and 'features' need before the start.",
-        low=0,
-        high=100,
+        1, "Number of subscribers that 'signal', 'exploration' and 'features' need before the start.", low=0, high=100
     )
     deadline_s: float = param(30.0, 'Time to wait for the subscribers.', unit='s', low=0.0)
     end_delay_s: float = param(
@@ -84,8 +81,7 @@ class ReplayParams:
     )
     start_delay_s: float = param(1.0, 'Time between finding the subscribers and the start.', unit='s', low=0.0)
     clock: bool = param(
-        False,
-        "Publishes the time of the recording on '/clock', for nodes whose parameter 'use_sim_time' is true.",
+        False, "Publishes the time of the recording on '/clock', for nodes whose parameter 'use_sim_time' is true."
     )
 
 

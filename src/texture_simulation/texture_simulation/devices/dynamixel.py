@@ -8,8 +8,8 @@ import math
 import struct
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,16 +44,14 @@ PHYSICS_S = 0.0005
 SPEED_FILTER_S = 0.02  # of the register Present Velocity; a guess, the manual names none
 
 
-@dataclass(frozen=True)
-class PressingMotor:
+class PressingMotor(NamedTuple):
     """A motor whose lever presses a fingertip on the object."""
 
     lever_m: float
     height_m: float  # above the object at the start
 
 
-@dataclass(frozen=True)
-class FingerMotors:
+class FingerMotors(NamedTuple):
     """The motors of a finger: what presses, and what moves the fingertip across and along the object, with levers."""
 
     press: int
@@ -77,12 +75,7 @@ LEAP_PRESSING = {finger.press: PressingMotor(0.09, 0.01) for finger in LEAP_FING
 class DynamixelMotors:
     """Control tables and mechanics of all motors."""
 
-    def __init__(
-        self,
-        ids: list[int],
-        pressing: Mapping[int, PressingMotor],
-        stiffness_n_m: float = 2000.0,
-    ) -> None:
+    def __init__(self, ids: list[int], pressing: Mapping[int, PressingMotor], stiffness_n_m: float = 2000.0) -> None:
         self.ids = ids
         self.absent: set[int] = set()  # cable out
         self.held: set[int] = set()  # something holds them where they are

@@ -284,6 +284,7 @@ class EmulatedController:
         self.robot = EmulatedRobot(params, rng)
         self.safety = SafetyMode.NORMAL
         self.acknowledge_s = 0.0  # how much later than done stops and zeroing are acknowledged
+        self.silent_s = 0.0  # for how much longer nothing is heard or answered
         self.program_name = CONTROL_SCRIPT  # of the one that runs, or ran last
         self.paused = False
         self._params = params
@@ -307,6 +308,7 @@ class EmulatedController:
     def tick(self) -> None:
         """Do one cycle."""
         self.time_s += self.step_s
+        self.silent_s = max(0.0, self.silent_s - self.step_s)
         if self.time_s >= self._starts_s:
             self._starts_s, self.program_name, self._program = math.inf, CONTROL_SCRIPT, self._control_script()
         if self.time_s - self._heard_s > self._watchdog_s:
@@ -490,9 +492,7 @@ class DashboardSession(Session):
 
     greeting = BANNER
 
-    def __init__(
-        self, controller: EmulatedController, sessions: set[Session], go_silent: Callable[[float], None]
-    ) -> None:
+    def __init__(self, controller: EmulatedController, sessions: set[Session]) -> None:
         super().__init__(controller, sessions)
         numbers = '.'.join(str(number) for number in controller.version)
         # Command: what answers the rest of the line.
@@ -510,7 +510,7 @@ class DashboardSession(Session):
             'pause': partial(_do, controller.pause, 'Pausing program'),
             'unlock protective stop': lambda _: 'Protective stop releasing' if controller.unlock() else TOO_EARLY,
             'emulate protective stop': partial(_do, controller.protective_stop, 'Stopped'),
-            'emulate silence': partial(_set, go_silent, 'seconds'),
+            'emulate silence': partial(_set, partial(setattr, controller, 'silent_s'), 'seconds'),
             'emulate slow': partial(_set, partial(setattr, controller, 'acknowledge_s'), 'seconds'),
             'emulate speed': partial(_set, partial(setattr, controller.robot, 'speed_fraction'), 'shares'),
         }
@@ -717,21 +717,12 @@ MAX_MISSED_CYCLES = 50
 async def serve(controller: EmulatedController, params: UrControllerParams, stopped: Callable[[], bool]) -> None:
     """Listen on the ports, print 'ready', and serve until `stopped`."""
     sessions: set[Session] = set()
-    silent_until_ns = 0
-
-    def go_silent(seconds: float) -> None:
-        nonlocal silent_until_ns
-        silent_until_ns = time.monotonic_ns() + int(seconds * 1e9)
-
-    ports: dict[int, Callable[[], Session]] = {
-        RTDE_PORT: partial(RtdeSession, controller, sessions),
-        SCRIPT_PORT: partial(ScriptSession, controller, sessions),
-    }
+    kinds: dict[int, type[Session]] = {RTDE_PORT: RtdeSession, SCRIPT_PORT: ScriptSession}
     if controller.version[0] < WITHOUT_DASHBOARD:
-        ports[DASHBOARD_PORT] = partial(DashboardSession, controller, sessions, go_silent)
+        kinds[DASHBOARD_PORT] = DashboardSession
     try:
-        for port, make_session in ports.items():
-            await asyncio.get_running_loop().create_server(make_session, params.ip, port)
+        for port, kind in kinds.items():
+            await asyncio.get_running_loop().create_server(partial(kind, controller, sessions), params.ip, port)
     except OSError as error:
         raise DeviceError(
             f'the emulated UR controller cannot listen on {params.ip}:{port}: {error}; give each controller '
@@ -744,7 +735,7 @@ async def serve(controller: EmulatedController, params: UrControllerParams, stop
         await asyncio.sleep(max(0, due_ns - time.monotonic_ns()) * 1e-9)
         missed = max(0, time.monotonic_ns() - due_ns) // step_ns
         due_ns += (1 + missed) * step_ns
-        heard = [] if time.monotonic_ns() < silent_until_ns else list(sessions)
+        heard = [] if controller.silent_s else list(sessions)
         for session in heard:
             session.answer()
         for _ in range(min(missed, MAX_MISSED_CYCLES)):
@@ -784,14 +775,9 @@ class ControllerProcess:
     def start(self) -> None:
         """Return when its ports are open."""
         command = [sys.executable, '-m', 'texture_simulation.devices.ur', json.dumps(dataclasses.asdict(self.params))]
-        self._process = subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            start_new_session=True,  # Ctrl-C is for the owner; the process sees that it has ended
-        )
+        # In a session without the terminal: Ctrl-C is for the owner; the process sees that it has ended.
+        pipes: Any = {'stdin': subprocess.DEVNULL, 'stdout': subprocess.PIPE, 'stderr': subprocess.PIPE}
+        self._process = subprocess.Popen(command, text=True, start_new_session=True, **pipes)
         assert self._process.stdout is not None
         answered, _, _ = select.select([self._process.stdout], [], [], START_S)
         if not answered or self._process.stdout.readline() != 'ready\n':

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -34,18 +33,15 @@ class LeapHandNode(Node):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('leap_hand', **kwargs)
         params = declare(self, LeapHandParams)
-        motors = leap_hand()
-        finger = LEAP_FINGERS[params.finger]
-        self._open = ExitStack()
-        self._bus = self._open.enter_context(
-            EmulatedDynamixelBus(Path(params.link).expanduser(), motors, finger, params.finger_pipe)
-        )
+        link, finger = Path(params.link).expanduser(), LEAP_FINGERS[params.finger]
+        self._bus = EmulatedDynamixelBus(link, leap_hand(), finger, params.finger_pipe)
+        self._bus.__enter__()
         Diagnostics(self, self._report, hardware_id=params.link)
         self.get_logger().info(f'an emulated LEAP hand is at {params.link}; its {params.finger} finger senses')
 
     def shutdown(self) -> None:
         """Unplug it."""
-        self._open.close()
+        self._bus.__exit__()
 
     def _report(self) -> DiagnosticReport:
         if not self._bus.running:

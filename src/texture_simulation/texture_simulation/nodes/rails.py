@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -33,16 +32,14 @@ class RailsNode(Node):
         super().__init__('rails', **kwargs)
         params = declare(self, RailsLinkParams)
         machine = declare(self, RailsMachine)
-        self._open = ExitStack()
-        self._rails = self._open.enter_context(
-            EmulatedRails(Path(params.link).expanduser(), machine, finger_pipe=params.finger_pipe)
-        )
+        self._rails = EmulatedRails(Path(params.link).expanduser(), machine, finger_pipe=params.finger_pipe)
+        self._rails.__enter__()
         Diagnostics(self, self._report, hardware_id=params.link)
         self.get_logger().info(f'emulated rails are at {params.link}')
 
     def shutdown(self) -> None:
         """Unplug them."""
-        self._open.close()
+        self._rails.__exit__()
 
     def _report(self) -> DiagnosticReport:
         firmware = self._rails.firmware
