@@ -386,6 +386,21 @@ def scenes(root: Path) -> str:
     return '\n'.join(rows) + '\n'
 
 
+def adaptors(root: Path) -> str:
+    """Return a table of the mappings that the node `adaptor` has for drivers of others."""
+    rows = ['| mapping | driver | messages | signals |', '|---|---|---|---|']
+    for path in sorted(root.glob('src/texture_drivers/config/adaptors/*.yaml')):
+        mapping = yaml.safe_load(path.read_text(encoding='utf-8'))
+        types = dict.fromkeys(f'`{one["type"]}`' for one in mapping['signals'].values())
+        rates = {
+            name: f'{one["rate_hz"]:g} Hz' if one.get('rate_hz') else '' for name, one in mapping['signals'].items()
+        }
+        signals = ', '.join(f'`{name}` {rate}'.strip() for name, rate in rates.items())
+        link = f'[{path.stem}](../../{path.relative_to(root)})'
+        rows.append(f'| {link} | {mapping["about"]} | {", ".join(types)} | {signals} |')
+    return '\n'.join(rows) + '\n'
+
+
 def experiments(root: Path) -> str:
     """Return the tables of all experiments: methods, anchor and findings."""
     return '\n'.join(f'### Experiment {name}\n\n{experiment(name, root)}' for name in DIGESTS)
@@ -441,6 +456,7 @@ PAGES: Mapping[str, tuple[str, str, Callable[[Path], str]]] = {
         'a custom one.',
         parts(
             ('Sensors', 'Values of the parameter `sensor`.', catalogue(SENSORS)),
+            ('Adaptors', 'Values of the parameter `mapping` of the node `adaptor`.', adaptors),
             ('Arms', 'Values of the parameter `arm`.', catalogue(ARMS)),
             (
                 'Motions',

@@ -29,12 +29,13 @@ from texture_recordings.dataset import SlideDataset
 from texture_simulation.offline import SlidePlan, write_simulated
 
 SCENE = 'twelve_textures'
-TRAINED = ('leather', 'woven_cloth', 'grid_2mm', 'sandpaper_fine')
-SHOWN = ('leather', 'cardboard')
+TRAINED = ('leather', 'woven_cloth', 'grid_2mm', 'sandpaper_fine', 'sandpaper_coarse', 'brushed_metal', 'glass')
+SHOWN = ('sandpaper_coarse', 'cardboard')
 UNTRAINED = SHOWN[1]
 PLAN = SlidePlan(slides=26, slide_s=1.6, speed_m_s=0.05, force_n=1.0)
-WINDOWS = {'length_s': 0.1, 'hop_s': 0.05}  # shorter than those of `default`, so that the evidence is seen to grow
-RATE_HZ, FRAMES_PER_S, HOLD_S = 1000.0, 12, 1.5
+WINDOWS = {'length_s': 0.04, 'hop_s': 0.02}  # shorter than those of `default`, so that the evidence is seen to grow
+RATE_HZ, FRAMES_PER_S, HOLD_S = 1000.0, 12, 2.0
+SLOWER = 1.5  # than real
 GREEN, RED, GREY = '#00704a', '#b3331f', '#9a9a9a'
 OUT = Path(__file__).with_name('recognition.gif')
 
@@ -80,7 +81,7 @@ class Panel:
         end_s = shown.duration_s
         scene.set(xlim=(0, 1.3 * end_s), ylim=(0, 1))
         scene.set_axis_off()
-        scene.set_title(title, fontsize=10, loc='left')
+        scene.set_title(title, fontsize=15, loc='left')
         rng = np.random.default_rng(len(shown.surface))
         ground = 0.22 + 0.05 * rng.random(160)
         scene.fill_between(np.linspace(0, 1.3 * end_s, 160), ground, color='#c9b79c', linewidth=0)
@@ -92,15 +93,17 @@ class Panel:
         [self._trace] = signal.plot([], [], color=COLOURS[0], linewidth=0.5)
         top = 1.05 * np.abs(shown.samples[self._seconds <= end_s]).max()
         signal.set(xlim=scene.get_xlim(), ylim=(-top, top), yticks=[], xticks=[])
-        signal.set_ylabel('signal', fontsize=8)
+        signal.set_ylabel('signal', fontsize=13)
         probability.set(xlim=scene.get_xlim(), ylim=(0, 1.04), yticks=[0, 0.5, 1])
-        probability.set_xlabel('sliding time (s)', fontsize=8)
-        probability.set_ylabel('probability', fontsize=8)
+        probability.set_xlabel('sliding time (s)', fontsize=13)
+        probability.set_ylabel('probability', fontsize=13)
         colours = dict(zip(shown.labels, COLOURS, strict=False))
-        self._lines = {name: probability.plot([], [], color=colours[name], linewidth=1.6)[0] for name in shown.labels}
-        style = {'fontsize': 8, 'va': 'center'}
+        self._lines = {name: probability.plot([], [], color=colours[name], linewidth=2.2)[0] for name in shown.labels}
+        style = {'fontsize': 13, 'va': 'center', 'ha': 'right'}
         self._names = {name: probability.text(0, 0, '', color=colours[name], **style) for name in colours}
-        self._verdict = scene.text(0.02, 0.6, '', fontsize=12, fontweight='bold', transform=scene.transAxes)
+        self._verdict = probability.text(
+            0.97, 0.5, '', fontsize=15, fontweight='bold', ha='right', va='center', transform=probability.transAxes
+        )
 
     def draw(self, now_s: float) -> None:
         """Show the slide as it is after some seconds; before it begins, the finger waits."""
@@ -118,38 +121,39 @@ class Panel:
             values = [equal, *(estimate.probabilities[number] for estimate in known)]
             line.set_data(seconds, values)
             finals[name] = values[-1]
-        # Labels next to the ends of the lines, the likeliest at its height and the rest below each other.
+        # Labels below the ends of the lines, the likeliest at its height and the rest below each other.
         height = 1.0
         for name in sorted(finals, key=finals.__getitem__, reverse=True):
             height = min(height, finals[name] + 0.12)
             shown = known and (finals[name] > 0.04 or name == max(finals, key=finals.__getitem__))
-            self._names[name].set(position=(seconds[-1] + 0.02, height - 0.04), text=name if shown else '')
+            self._names[name].set(position=(1.28 * self._shown.duration_s, height - 0.1), text=name if shown else '')
             height -= 0.13
         if now_s < self._shown.duration_s:
             self._verdict.set_text('')
             return
         last = self._shown.estimates[-1]
         accepted = last.rejection.name == 'NONE'
-        text = f'accepted: {last.label}' if accepted else f'rejected: {last.rejection.name.lower().replace("_", " ")}'
+        reason = last.rejection.name.lower().replace('_', ' ')
+        text = f'accepted:\n{last.label}' if accepted else f'rejected: {reason}\n(nearest: {last.label})'
         self._verdict.set(text=text, color=GREEN if accepted else RED)
 
 
 def animate(slides: list[Shown], path: Path) -> None:
     """Write the animation: one slide after the other, then both results."""
-    figure, axes = plt.subplots(3, 2, figsize=(8.0, 4.3), height_ratios=(2.2, 1.6, 3), layout='constrained')
-    titles = (f'{SHOWN[0]}: trained, this slide is new', f'{SHOWN[1]}: never trained')
+    figure, axes = plt.subplots(3, 2, figsize=(8.0, 5.2), height_ratios=(2.4, 1.3, 3), layout='constrained')
+    titles = (f'{SHOWN[0]}: trained', f'{SHOWN[1]}: never trained')
     panels = [Panel(slide, *column, title) for slide, column, title in zip(slides, axes.T, titles, strict=True)]
     for axis in axes[1:].ravel():
         axis.spines[['top', 'right']].set_visible(False)
-        axis.tick_params(labelsize=7)
-    ends = np.cumsum([slide.duration_s + 0.6 for slide in slides])
+        axis.tick_params(labelsize=11)
+    ends = np.cumsum([slide.duration_s + 0.3 for slide in slides])
 
     def draw(frame: int) -> None:
-        now_s = frame / FRAMES_PER_S if frame >= 0 else float(ends[-1])
+        now_s = frame / FRAMES_PER_S / SLOWER if frame >= 0 else float(ends[-1])
         panels[0].draw(now_s)
         panels[1].draw(now_s - float(ends[0]))
 
-    moving = range(round(float(ends[-1]) * FRAMES_PER_S))
+    moving = range(round(float(ends[-1]) * FRAMES_PER_S * SLOWER))
     hold = [-1] * round(HOLD_S * FRAMES_PER_S)
     FuncAnimation(figure, draw, frames=[-1, *moving, *hold]).save(path, PillowWriter(FRAMES_PER_S), dpi=90)
 

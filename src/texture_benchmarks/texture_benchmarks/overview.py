@@ -216,7 +216,7 @@ STYLES: Mapping[str, dict[str, Any]] = {
 }
 DASHES = {OURS: '-', PAPERS: '-.', PEERS: '--'}
 LEAST = 0.3  # percent wrong that is drawn for none wrong: half a slide of 200 is 0.25
-TICKS = {LEAST: '0', 0.5: '0.5', 1.0: '1', 2.0: '2', 5.0: '5', 10.0: '10', 20.0: '20', 50.0: '50', 100.0: '100'}
+TICKS = {LEAST: '100', **{wrong: f'{100.0 - wrong:g}' for wrong in (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)}}
 TICKS_S = (0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0)
 
 
@@ -226,17 +226,17 @@ def wrong_percent(value: AnyArray | Sequence[float] | float) -> Array:
 
 
 def sliding_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
-    """Draw the percentage of slides wrong over the sliding time, with intervals, in a panel for the channels used."""
+    """Draw the accuracy of slides over the sliding time, with the interval of ours, in a panel for the channels."""
     counts = {cell['slides'] for cells in numbers.values() for cell in cells.values()}
-    title = f'Same track, {max(counts)} later slides of biotac20'
-    with chart(path, (8.0, 8.6), title, points=11.0) as figure:
+    title = f'Accuracy on the same track, {max(counts)} later slides'
+    with chart(path, (7.0, 7.6), title, points=11.0) as figure:
         for axes, channels in zip(figure.subplots(2, 1, sharex=True), (VIBRATION, ALL_CHANNELS), strict=True):
             _draw_sliding(axes, _shown(numbers, channels))
             axes.set_title(channels)
         axes.set_xlabel('sliding time (s)')
-        axes.plot([], [], '*', color='black', markersize=13, label='mean end and errors with early stopping')
-        axes.fill_between([], [], [], color='grey', alpha=0.2, label='95 % interval')
-        figure.legend(loc='outside lower left', ncols=2)
+        axes.plot([], [], '*', color='black', markersize=13, label='mean end and accuracy with early stopping')
+        axes.fill_between([], [], [], color='grey', alpha=0.2, label=f'95 % interval of {OURS}')
+        figure.legend(loc='outside lower left')
     return Path(path)
 
 
@@ -258,8 +258,9 @@ def _draw_sliding(axes: Any, shown: Mapping[str, Mapping[str, Any]]) -> None:
     for name, cell in shown.items():
         dashes = ':' if name.startswith(PEERS_SHOWN[0]) else DASHES[cell['kind']]
         style, wrong = STYLES[cell['kind']], wrong_percent(cell['share'])
-        high, low = wrong_percent(cell['interval']).T
-        axes.fill_between(cell['s'], low, high, alpha=0.13, linewidth=0, **style)
+        if cell['kind'] == OURS:  # several bands would hide each other; the table has the other intervals
+            high, low = wrong_percent(cell['interval']).T
+            axes.fill_between(cell['s'], low, high, alpha=0.13, linewidth=0, **style)
         axes.plot(cell['s'], wrong, dashes, linewidth=2.0, **style)
         if ends := cell.get('ends_when_decided'):
             axes.plot(ends['mean_s'], wrong_percent(ends['accuracy']), '*', markersize=15, markeredgecolor='black',
@@ -267,7 +268,7 @@ def _draw_sliding(axes: Any, shown: Mapping[str, Mapping[str, Any]]) -> None:
     last = [float(np.log10(wrong_percent(cell['share'][-1]))) for cell in shown.values()]
     for (name, cell), height in zip(shown.items(), spread(last, 0.24), strict=True):
         axes.text(6.25, 10**height, name, va='center', **STYLES[cell['kind']])
-    axes.set(xscale='log', yscale='log', xlim=(0.45, 6.1), ylim=(100.0, LEAST * 0.8), ylabel='slides wrong (%)')
+    axes.set(xscale='log', yscale='log', xlim=(0.45, 6.1), ylim=(100.0, LEAST * 0.8), ylabel='accuracy (%)')
     axes.set_xticks([s for s in TICKS_S if s > 0.4], [f'{s:g}' for s in TICKS_S if s > 0.4])
     axes.set_yticks([*TICKS], [*TICKS.values()])
     axes.minorticks_off()
@@ -287,7 +288,7 @@ TICKS_US = (50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000, 50_000)
 
 
 def computing_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
-    """Draw the percentage of slides wrong after AT_S over the computing time of a window, with the front of all."""
+    """Draw the accuracy of slides after AT_S over the computing time of a window, with the front of all."""
     cells = [
         (name, channels, cell)
         for channels in (VIBRATION, ALL_CHANNELS)
@@ -297,8 +298,8 @@ def computing_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
     accuracies = [cell['accuracy_at_s'][f'{AT_S:.1f}'] for _, _, cell in cells]
     points = [(cell['latency_us']['median'], value) for (_, _, cell), value in zip(cells, accuracies, strict=True)]
     front = pareto_front(points)
-    title = f'Same track: slides wrong after {AT_S:g} s of sliding, against computing time'
-    with chart(path, (8.0, 7.6), title, points=11.0) as figure:
+    title = f'Accuracy on the same track after {AT_S:g} s, by computing time'
+    with chart(path, (7.0, 7.2), title, points=11.0) as figure:
         axes = figure.subplots()
         axes.step([points[at][0] for at in front], wrong_percent([points[at][1] for at in front]), where='post',
                   color='black', linewidth=1.0, zorder=1, label='Pareto front')  # fmt: skip
@@ -313,8 +314,8 @@ def computing_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
             axes.plot([], [], 'o', markersize=7, label=kind, **STYLES[kind])
         for channels, mark in MARKS.items():
             axes.plot([], [], mark, color='white', markeredgecolor='black', markersize=7, label=channels)
-        axes.plot([], [], '-', color='grey', label='to the right: 99 of 100 windows; up and down: 95 % interval')
-        axes.set(xscale='log', yscale='log', ylim=(110.0, LEAST * 0.8), ylabel='slides wrong (%)')
+        axes.plot([], [], '-', color='grey', label='across: 99 of 100 windows; upright: 95 % interval')
+        axes.set(xscale='log', yscale='log', ylim=(110.0, LEAST * 0.8), ylabel='accuracy (%)')
         axes.set_yticks([*TICKS], [*TICKS.values()])
         axes.set_xlabel('computing time of a window, median (µs)')
         axes.minorticks_off()

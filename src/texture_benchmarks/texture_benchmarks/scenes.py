@@ -294,12 +294,14 @@ def ablation_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
     panels = numbers['terms']
     terms = {name: {t: row for t, row in figures.items() if isinstance(row, dict)} for name, figures in panels.items()}
     rows = -(-len(panels) // COLUMNS)
-    size = (9.0, 0.9 + rows * (0.8 + 0.27 * max(map(len, terms.values()))))
-    with chart(path, size, 'Change of accuracy when a term of a simulated scene is left out') as figure:
+    size = (7.2, 1.1 + rows * (0.9 + 0.27 * max(map(len, terms.values()))))
+    with chart(path, size, 'Change of accuracy without a term of a simulated scene', points=10.5) as figure:
         grid = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
         for axes, (name, row) in zip(grid, terms.items(), strict=False):
             _draw_terms(axes, row)
-            axes.set_title(f'{name}: {panels[name]["accuracy"]:.0%} right'.replace('%', ' %'), fontsize=9)
+            axes.set_title(
+                f'{name}: {panels[name]["accuracy"]:.0%}'.replace('%', ' %').replace('with one of', 'and one of')
+            )
         for axes in grid[len(panels) :]:
             axes.axis('off')
         figure.legend(*grid[0].get_legend_handles_labels(), loc='outside lower left', title='the term is left out of')
@@ -320,7 +322,7 @@ def _draw_terms(axes: Any, terms: Mapping[str, Mapping[str, Mapping[str, float]]
         )  # fmt: skip
     axes.axvline(0.0, color='black', linewidth=0.8)
     axes.set_yticks(np.arange(len(terms)), [term.replace('_', ' ') for term in terms])
-    axes.set(xlabel='change of accuracy (percentage points)', ylim=(len(terms) - 0.5, -0.5))
+    axes.set(xlabel='change (percentage points)', ylim=(len(terms) - 0.5, -0.5))
 
 
 # Dear scenes are measured less often: stick-slip costs ten times as much, eight channels five times.

@@ -37,6 +37,8 @@ CHANGES = {
 def data(tmp_path_factory):
     """Return a folder with bags 'glass' and 'leather' of simulated slides, and models trained on them."""
     folder = tmp_path_factory.mktemp('data')
+    (folder / 'old.added').mkdir()
+    (folder / 'old.added' / '1.json').touch()
     write_simulated(folder, PLAN, np.random.default_rng(0), surfaces=('glass', 'leather'))
     bags = [str(folder / 'glass'), str(folder / 'leather')]
     assert main(['train', 'default', *bags, '-o', str(folder / 'fast')]) == 0
@@ -97,6 +99,7 @@ def test_the_models_are_good_and_the_figures_are_written(data, capsys, tmp_path)
         ('cross-validate stratified:2 default two-fingers glass leather', "has no '"),
         ('cross-validate leave-one-out:speed default glass leather', "all are of one group, '0.05'"),
         ('train default glass leather -o fast', "'fast.npz' exists; give another name, or --force to replace it"),
+        ('train default glass leather -o old', "slides were added to an earlier model, in 'old.added'; move them away"),
         ('train default glass leather -o no/x', "there is no folder 'no' for the model"),
         ('check fast', 'store that slide by `texture check fast --store`'),
         ('trian', "did you mean 'train'?"),

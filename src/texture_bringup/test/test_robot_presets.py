@@ -21,7 +21,7 @@ from texture_exploration.arms.tool_state import RosControllersParams
 from texture_exploration.arms.ur import UrArmParams
 from texture_exploration.guards import SignalWatchParams
 from texture_exploration.safety import SafetyLimits
-from texture_exploration.touch import TouchParams
+from texture_exploration.touch import WALL_SHARE, TouchParams
 from texture_simulation.devices.twist_controller import TwistControllerParams
 from texture_simulation.devices.ur import UrControllerParams
 from texture_simulation.emulator import EmulatorParams
@@ -64,6 +64,20 @@ def test_the_first_contact_is_the_same_with_and_without_the_driver_and_in_the_pa
         shared = direct.keys() & other.keys()
         assert {'contact_force_n', 'force_limit_n', 'max_force_n', 'approach_speed_m_s'} <= shared
         assert {name: other[name] for name in shared} == {name: direct[name] for name in shared}
+
+
+def test_the_page_with_the_limits_has_those_of_the_preset():
+    values = values_of((PRESETS[0].parent / 'ur5e_ur_robot_driver.yaml').read_text())
+    limit_n, tolerance = values['force_limit_n'], values['force_tolerance']
+    page = (ROOT / 'docs' / 'motion.md').read_text()
+    for expected in (
+        f'`force_limit_n` {limit_n:g} N (at a wall {WALL_SHARE * limit_n:g} N)',
+        f'`tangential_floor_n` {values["tangential_floor_n"]:g} N',
+        f'`z_low_m` −{-values["z_low_m"]:g} m',
+        f'overshoot {100 * tolerance:g} %, mean force of a slide {200 * tolerance:g} % off',
+        f'`approach_travel_m` {1e3 * values["approach_travel_m"]:g} mm in at most {values["approach_timeout_s"]:g} s',
+    ):
+        assert expected in page.replace('\n', ' ')
 
 
 @pytest.mark.parametrize('robot', ROBOTS)

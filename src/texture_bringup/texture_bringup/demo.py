@@ -159,7 +159,8 @@ def _clear(folder: Path) -> None:
     """Make the folder; remove what an earlier demonstration has left there, and nothing else."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        shutil.rmtree(folder / TRAINING, ignore_errors=True)
+        for left in (TRAINING, f'{MODEL}.added'):
+            shutil.rmtree(folder / left, ignore_errors=True)
         models = (f'{name}{ending}' for name in (MODEL, ROUGHNESS) for ending in ('.npz', '.json'))
         for file in (PICTURE, LOG, GRADES, *models):
             (folder / file).unlink(missing_ok=True)
@@ -280,10 +281,10 @@ def _report(slides: Sequence[Slide], out: Path) -> None:
 
 def draw(slides: Sequence[Slide], path: Path) -> None:
     """Draw for each slide how the probabilities grew while the finger slid, and how it ended."""
-    columns = 4
+    columns = 2
     rows = -(-len(slides) // columns)
-    title = 'Probability of each trained surface while the finger slides (simulated)'
-    with chart(path, (11.0, 2.7 * rows + 0.6), title) as figure:
+    title = 'Probability of each surface while the finger slides (simulated)'
+    with chart(path, (7.2, 1.9 * rows + 0.6), title, points=10.5) as figure:
         axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
         for axis in axes.ravel()[len(slides) :]:
             axis.set_visible(False)

@@ -115,7 +115,7 @@ GONE_S = 4.0
 ACCEPT_S = 15.0
 # Time to find a service, and time for its answer: an arm needs seconds to recover, a tare up to 65 s.
 OFFERED_S, ANSWER_S = 10.0, 75.0
-SETTINGS_S = 30.0  # to find the parameters of a node
+SETTINGS_S = 10.0  # to find the parameters of a node
 RETRY_PERIOD_S = 5.0
 # What this process has discovered, the others discover soon after.
 DISCOVERY_S = 1.0
@@ -404,7 +404,9 @@ class Operator:
         if node not in self._settings:
             self._settings[node] = AsyncParameterClient(self._node, node)
         client = self._settings[node]
-        self._until(client.services_are_ready, SETTINGS_S, f"node '{node}' does not answer; is it running?")
+        self._until(
+            client.services_are_ready, SETTINGS_S, f"no node '{node}' answers; start it, or give its --namespace"
+        )
         return client
 
     def _answer(self, node: str, future: Future) -> Any:

@@ -104,4 +104,4 @@ def test_a_node_with_a_misspelled_parameter_does_not_start(tmp_path: Any, capfd:
     with pytest.raises(SystemExit) as ended:
         run(n, ['--ros-args', '--params-file', str(file)])
     assert ended.value.code == 2
-    assert "n: node 'n' has no parameter 'lenght_s'; did you mean 'length_s'? Correct" in capfd.readouterr().err
+    assert "texture: node 'n' has no parameter 'lenght_s'; did you mean 'length_s'? Correct" in capfd.readouterr().err

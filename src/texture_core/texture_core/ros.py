@@ -320,7 +320,7 @@ def run(
     except ExternalShutdownException:
         pass
     except TextureError as error:
-        print(f'{getattr(make_node, "__name__", "node")}: {error}', file=sys.stderr)
+        print(f'texture: {error}', file=sys.stderr)
         sys.exit(2)
     finally:
         if node is not None:

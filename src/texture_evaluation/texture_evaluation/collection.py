@@ -232,7 +232,7 @@ class PlaceAccuracy:
         mistaken = f', mostly misidentified as {self.confused}' if self.confused else ''
         found = (
             f'{self.correct} of {self.places} left-out places correct{mistaken}; at new places at least '
-            f'{100 * self.bound:.0f} % (90 % bound), against {self.others} other surfaces'
+            f'{100 * self.bound:.0f} % (90 % bound), against {self.others} other surface{"s" * (self.others > 1)}'
         )
         if not self.bands:
             return found

@@ -428,13 +428,13 @@ def comparison_chart(results: Sequence[CrossValidation], title: str, path: str |
     -------
     Path
     """
-    with chart(path, (10.0, 2.4 + 0.5 * len(results)), title) as figure:
-        accuracies, times = figure.subplots(1, 2)
+    with chart(path, (7.0, 5.0 + 0.5 * len(results)), title, points=10.5) as figure:
+        accuracies, times = figure.subplots(2, 1, height_ratios=(1.4 + 0.5 * len(results), 3.6))
         _draw_accuracies(accuracies, results)
         for result, style in zip(results, line_styles(), strict=False):
             seconds, accuracy = curve(result.pooled)
             times.plot(seconds, 100 * accuracy, label=result.recipe, marker='.', **style)
-        times.set(xlabel='sliding time used (s), as far as all slides reach', ylabel='slides recognised (%)')
+        times.set(xlabel='sliding time used (s), as far as all slides reach', ylabel='accuracy of slides (%)')
         times.set(xlim=(0, None), ylim=(None, 101))
         times.legend(loc='best')
     return Path(path)
@@ -451,7 +451,7 @@ def _draw_accuracies(axes: Any, results: Sequence[CrossValidation]) -> None:
             accuracies, rows + offset, xerr=errors, fmt=marker, color=colour, capsize=3, label=f'{name}, 95 % interval'
         )
     axes.set_yticks(rows, [result.recipe for result in results])
-    axes.set(xlabel='right (%)', xlim=(None, 101), ylim=(len(results) - 0.5, -0.5))
+    axes.set(xlabel='accuracy (%)', xlim=(None, 101), ylim=(len(results) - 0.5, -0.5))
     axes.legend(loc='best')
 
 

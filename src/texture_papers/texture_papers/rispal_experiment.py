@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -197,10 +198,12 @@ def grades_chart(
     human = {name: row['human'] for series in panels.values() for one in series.values() for name, row in one.items()}
     order = sorted(textures, key=lambda name: (human[name], list(textures).index(name)))
     place = {name: index for index, name in enumerate(order)}
-    with chart(path, (0.36 * len(order) + 2.0, 2.9 * len(panels) + 1.0), title) as figure:
+    with chart(
+        path, (0.25 * len(order) + 1.2, 2.6 * len(panels) + 1.4), textwrap.fill(title, 60), points=10.5
+    ) as figure:
         rows = figure.subplots(len(panels), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
         for axes, (name, series) in zip(rows, panels.items(), strict=True):
-            axes.scatter(range(len(order)), [human[texture] for texture in order], marker='_', s=160,
+            axes.scatter(range(len(order)), [human[texture] for texture in order], marker='_', s=90,
                          color=COLOURS[5], label='people', zorder=4)  # fmt: skip
             for kind, one in series.items():
                 _grade_bars(axes, one, place, kind)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""`texture endurance`: explore on an emulated robot while faults befall it, each in turn."""
+"""`texture endurance`: explore on an emulated robot while faults are injected, each in turn."""
 
 from __future__ import annotations
 

@@ -369,8 +369,9 @@ def _configure_collect(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('surface', help='label of the surface under the finger')
     parser.add_argument('folder', type=Path, help='folder of the bags of all surfaces; made if missing')
     shape: dict[str, Any] = {'type': float, 'nargs': 2, 'default': (0.0, 0.0), 'metavar': ('LOW', 'HIGH')}
-    parser.add_argument('--speed', help='speeds of the slides (default: 0.02 to 0.05), m/s', **shape)
-    parser.add_argument('--force', help='normal forces of the slides (default: 1 to 2), N', **shape)
+    speed, force = 'speeds of the slides, m/s (default: 0.02 to 0.05)', 'normal forces, N (default: 1 to 2)'
+    parser.add_argument('--speed', help=f'{speed}, as far as the explorer allows', **shape)
+    parser.add_argument('--force', help=f'{force}, or the lowest that the explorer allows to twice that', **shape)
     add_parameters(parser, collection.CollectionParams, without=SHORTER)
     parser.add_argument(
         '--distance', type=float, default=0.04, metavar='M', help='length of each slide (default: 0.04)'

@@ -50,6 +50,11 @@ def _check_place(out: Path, *, replace: bool) -> None:
     file = out.with_name(f'{out.name.removesuffix(".npz")}.npz')
     if file.exists() and not replace:
         raise InvalidParameter(f"'{file}' exists; give another name, or --force to replace it")
+    added = file.with_suffix('.added')
+    if any(added.glob('*')):  # they would belong to the new model at once
+        raise InvalidParameter(
+            f"slides were added to an earlier model, in '{added}'; move them away, or give another name"
+        )
     if not file.parent.is_dir():
         raise InvalidParameter(f"there is no folder '{file.parent}' for the model; make it, or name another")
 

@@ -89,7 +89,10 @@ class RosTopics:
         topics = (self._twists.topic_name, self._frame_id, self._poses.topic_name)
         self._guard = TwistGuard(node.get_namespace(), topics, self._lock)
         if not (params.controller_timeout_s or scope()):
-            node.get_logger().warning(f"'accept_shared_group' is true: {NO_SCOPE.format(topic=params.twist_topic)}")
+            node.get_logger().warning(
+                "'accept_shared_group' is true: what ends the whole control group of this process, as stopping a "
+                f"container does, ends the guard of the arm, too, and '{params.twist_topic}' keeps it moving"
+            )
 
     def newest_pose(self) -> PoseSample | None:
         """Return the newest pose that came since the last call, None if none did."""

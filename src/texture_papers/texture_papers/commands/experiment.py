@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""`texture experiment`: rebuild a paper's experiment: its figures next to ours."""
+"""`texture experiment`: reproduce a paper's experiment: its figures next to ours."""
 
 from __future__ import annotations
 
