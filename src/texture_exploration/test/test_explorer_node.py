@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from contextlib import closing
+from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
 from unittest.mock import Mock
@@ -319,7 +320,10 @@ def test_an_arm_without_motors_that_latch_errors_has_no_service_reboot(world):
 def test_an_arm_in_a_protective_stop_is_recovered_by_a_service(world):
     recover = world.client.create_client(Trigger, 'explorer/recover')
     assert recover.wait_for_service(DEADLINE_S)
-    world.explorer._explorer.arm.fail('protective stop')
+    arm = world.explorer._explorer.arm
+    connect, state = arm.connect, arm.state
+    arm.state = lambda: replace(state(), fault='protective stop')
+    arm.connect = lambda: (setattr(arm, 'state', state), connect())
     response = world.result(recover.call_async(Trigger.Request()))
     assert (response.success, response.message) == (True, 'the arm can move')
     assert world.explored(world.call(**QUICK)).error_code == OK

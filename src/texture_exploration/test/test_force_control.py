@@ -5,12 +5,12 @@
 from dataclasses import replace
 
 import pytest
+from table_arm import TableArmParams
 
 from texture_core.errors import InvalidParameter
 from texture_core.types import ExplorationRequest
-from texture_exploration.arms.simulated import SimulatedArmParams
+from texture_exploration.arms.arm import ArmCommand, ArmState
 from texture_exploration.force_control import (
-    ContactState,
     ForceController,
     ForceLoop,
     ForceLoopParams,
@@ -44,12 +44,16 @@ def test_what_is_too_stiff_and_too_late_to_be_touched_gently_is_refused():
         ForceLoop(params, PERIOD_S)
 
 
+def press(loop, time_s, force_n):
+    state = ArmState(round((1.0 + time_s) * 1e9), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), force_n)
+    loop.velocity(ArmCommand(force_n=1.0), state, PERIOD_S)
+
+
 def stood(force_n, steps=60, **given):
     """Return the doubt after the first touch, of a finger that is to stand; `force_n` over the time in s."""
     loop = ForceLoop(ForceLoopParams(**given), PERIOD_S)
     for step in range(steps):
-        contact = ContactState(round((1.0 + step * PERIOD_S) * 1e9), force_n(step * PERIOD_S))
-        loop.velocity_m_s(1.0, contact, 0.0, PERIOD_S)
+        press(loop, step * PERIOD_S, force_n(step * PERIOD_S))
     return loop.doubt
 
 
@@ -64,7 +68,7 @@ def test_a_pause_of_this_machine_after_the_touch_makes_no_force_late(pause_s):
     loop = ForceLoop(ForceLoopParams(), PERIOD_S)
     times_s = [0.0, *(pause_s + step * PERIOD_S for step in range(60))]
     for time_s in times_s:
-        loop.velocity_m_s(1.0, ContactState(round((1.0 + time_s) * 1e9), 0.05 if time_s < 0.008 else 0.17), 0.0, 0.004)
+        press(loop, time_s, 0.05 if time_s < 0.008 else 0.17)
     assert loop.doubt == ''
 
 
@@ -89,7 +93,7 @@ LOOPS = [
 @pytest.mark.parametrize('loop', LOOPS)
 def test_a_declared_stiffness_and_delay_press_with_a_fifth_too_much_at_most(make_table, loop):
     declared, true, delay_ms, noise_mn = loop
-    arm = SimulatedArmParams(
+    arm = TableArmParams(
         force_mode=False,
         start_height_m=0.001,
         max_stiffness_n_m=declared,

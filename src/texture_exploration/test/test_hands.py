@@ -419,7 +419,7 @@ def test_a_finger_that_loses_the_object_is_a_fault_that_names_it():
     hand = SimulatedHand()
     arm = InHandArm(InHandParams(finger_set='kaboli-test'), hand)
     arm.connect()
-    hand.fingers['ring'].push(-1.9)
+    hand.fingers['ring']._force_n = lambda *_: 0.1
     until(lambda: arm.state().fault.startswith('the grip is lost: ring presses with'))
     arm.close()
 

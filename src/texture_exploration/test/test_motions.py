@@ -7,11 +7,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from table_arm import TableArm, TableArmParams
 
 from texture_core.errors import ExplorationError, MotionRefused
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.arm import ArmState
-from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
 from texture_exploration.motions import DEFAULTS, MOTIONS
 from texture_exploration.paths import CircularPath, PathFollower, StraightPath, StrokeEnds, ramp_s, ramps_m, smooth
 from texture_exploration.safety import SafetyLimits
@@ -158,25 +158,26 @@ def test_a_default_beyond_a_limit_is_the_limit():
 # Circles.
 
 
-class LateArm(SimulatedArm):
+class LateArm(TableArm):
     """An arm that takes two more steps of 5 ms to follow."""
 
-    def __init__(self, *args, **kwargs):
-        super().__init__(*args, **kwargs)
-        self._coming = []
+    def __init__(self, *args):
+        super().__init__(*args)
+        self._commands = []
 
     def step(self, dt_s):
-        self._coming.append(self._last_command)
+        self._commands.append(self._last_command)
         newest = self._last_command
-        self._last_command = self._coming.pop(0) if len(self._coming) > 2 else self._coming[0]
+        self._last_command = self._commands.pop(0) if len(self._commands) > 2 else self._commands[0]
         super().step(dt_s)
         self._last_command = newest
 
 
-@pytest.mark.parametrize('arm_class', [SimulatedArm, LateArm])
+@pytest.mark.parametrize('arm_class', [TableArm, LateArm])
 @pytest.mark.parametrize('speed', [0.05, 0.1, 0.15])
 def test_the_radius_is_kept_within_a_millimetre(table, speed, arm_class):
-    table.arm = arm_class(SimulatedArmParams(), clock=lambda: table.now_ns, own_thread=False)
+    table.arm = arm_class(TableArmParams(), lambda: table.now_ns)
+    table.arm.connect()
     assert table.explore(ExplorationRequest('circular', speed_m_s=speed, turns=3.0)).success
     radii = [math.hypot(x, y) for _, (x, y, _) in sliding(table)]
     assert max(abs(radius - 0.02) for radius in radii) < 0.001
@@ -312,7 +313,7 @@ def guaranteed_speeds(table, request):
 
 @pytest.mark.parametrize('lag_s', [0.008, 0.02, 0.05])
 def test_after_a_turn_a_late_arm_is_steady_only_when_it_has_turned(make_table, lag_s):
-    table = make_table(SimulatedArmParams(force_mode=False, loop_delay_s=lag_s, start_height_m=0.002))
+    table = make_table(TableArmParams(force_mode=False, loop_delay_s=lag_s, start_height_m=0.002))
     speeds = guaranteed_speeds(table, RUB)
     assert len(speeds) > 100
     begun_within = abs(speeds[0] / 0.02 - 1)

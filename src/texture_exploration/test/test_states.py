@@ -8,11 +8,11 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from table_arm import TableArmParams
 
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration import force_control, guards, lift_first, safety, stages, touch, watches
 from texture_exploration.arms.arm import STANDSTILL
-from texture_exploration.arms.simulated import SimulatedArmParams
 from texture_exploration.explorer import PERIOD_S
 from texture_exploration.motion import STATES, limit_table, state_table
 from texture_exploration.motions import MOTIONS
@@ -46,7 +46,7 @@ HAPPENS = {
 
 @pytest.mark.parametrize('name', HAPPENS)
 def test_each_state_commands_and_leads_to_what_its_row_says(make_table, monkeypatch, name):
-    table, seen, entered = make_table(SimulatedArmParams(start_height_m=0.003)), [], []
+    table, seen, entered = make_table(TableArmParams(start_height_m=0.003)), [], []
     phase, happens = HAPPENS[name]
     if phase:
         table.when[phase] = lambda: happens(table)

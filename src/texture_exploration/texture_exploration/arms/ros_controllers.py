@@ -21,8 +21,6 @@ from texture_exploration.arms.arm import (
     STANDSTILL,
     ArmCommand,
     ArmState,
-    CommandedVelocity,
-    ForceReading,
     SurfaceArm,
     Vector,
     give_up_when_ending,
@@ -36,6 +34,7 @@ from texture_exploration.arms.tool_state import (
     RosControllersParams,
     ToolState,
 )
+from texture_exploration.force_control import ForceLoop
 from texture_exploration.guards import GAP_NS, Listening
 
 
@@ -106,7 +105,7 @@ class RosControllersArm(SurfaceArm):
     """
 
     Params = RosControllersParams
-    force_reading = ForceReading.NOISY
+    noisy_force = True
     _params: RosControllersParams
     _state: ArmState
     _command: tuple[ArmCommand, int] | None  # and when it came
@@ -300,7 +299,7 @@ class RosControllersArm(SurfaceArm):
         params = self._params
         loop = replace(params, loop_delay_s=min(0.1, params.loop_delay_s + params.force_smoothing_s))
         self._tool = ToolState(params)
-        self._velocity = CommandedVelocity(loop, 1.0 / params.rate_hz)
+        self._loop = ForceLoop(loop, 1.0 / params.rate_hz)
         self._follow = FollowWatch()
         self._state = self._tool.state('')
         self._command = None
@@ -314,7 +313,7 @@ class RosControllersArm(SurfaceArm):
 
     def doubt(self) -> str:
         """Return in a sentence that the force is too late for force control, '' if not."""
-        return self._velocity.doubt()
+        return self._loop.doubt
 
     def warning(self) -> str:
         """Return in a sentence that clocks do not agree, '' if they do."""
@@ -422,7 +421,7 @@ class RosControllersArm(SurfaceArm):
         state = self._state
         if command is not None and command.force_n is not None:
             self._tool.zero.presume_contact()
-        velocity = REST if state.fault else self._velocity.choose(command or STANDSTILL, state, held_s)
+        velocity = REST if state.fault else self._loop.velocity(command or STANDSTILL, state, held_s)
         if velocity != REST:
             self._tool.rest.forget()
         if not self._tool.rest.at_rest:

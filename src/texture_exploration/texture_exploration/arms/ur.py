@@ -27,7 +27,6 @@ from texture_exploration.arms.arm import (
     STANDSTILL,
     ArmCommand,
     ArmState,
-    ForceReading,
     SurfaceArm,
     SurfacePoseParams,
     Vector,
@@ -478,7 +477,7 @@ class UrArm(SurfaceArm):
     """
 
     Params = UrArmParams
-    force_reading = ForceReading.NOISY  # in double precision
+    noisy_force = True  # in double precision
     _params: UrArmParams
 
     def __init__(self, params: UrArmParams = UrArmParams()) -> None:
