@@ -5,7 +5,6 @@
 import math
 from itertools import pairwise
 
-import numpy as np
 import pytest
 from table_arm import TableArm, TableArmParams
 
@@ -13,7 +12,7 @@ from texture_core.errors import ExplorationError, MotionRefused
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.arm import ArmState
 from texture_exploration.motions import DEFAULTS, MOTIONS
-from texture_exploration.paths import CircularPath, PathFollower, StraightPath, StrokeEnds, ramp_s, ramps_m, smooth
+from texture_exploration.paths import CircularPath, PathFollower, StraightPath, ramp_s, ramps_m, smooth
 from texture_exploration.safety import SafetyLimits
 from texture_exploration.touch import TouchParams
 
@@ -128,8 +127,6 @@ REFUSED = [
     ('circular', {'radius_m': 0.005, 'speed_m_s': 0.2}, INVALID, 'at most 0.158 m/s'),
     ('circular', {'radius_m': 0.1}, OUTSIDE, 'at most 0.05 m'),
     ('in_hand_sliding', {'speed_m_s': 0.1, 'distance_m': 0.01}, INVALID, 'of a stroke, is 0.01; allowed is 0.0'),
-    # A random stroke may be half as long, so the shortest that turns is twice that.
-    ('in_hand_random', {'speed_m_s': 0.05, 'distance_m': 0.02}, INVALID, 'of a stroke, is 0.02; allowed is 0.0'),
 ]
 
 
@@ -141,11 +138,6 @@ def test_what_cannot_be_done_is_refused_with_what_can_and_names_the_field(motion
     assert sentence in str(refused.value)
     assert refused.value.error == error
     assert refused.value.field in numbers
-
-
-def test_a_whole_stroke_turns_where_a_random_one_is_too_short():
-    request = ExplorationRequest('in_hand_sliding', speed_m_s=0.05, distance_m=0.02)
-    MOTIONS['in_hand_sliding'](request, (0.0, 0.0, 0.01), TouchParams(), LIMITS)
 
 
 def test_a_default_beyond_a_limit_is_the_limit():
@@ -326,27 +318,6 @@ def test_no_turn_exceeds_the_acceleration(table):
     velocities = [(s.stamp_ns, p) for s, p in sliding(table)]
     speeds = [(b[1][0] - a[1][0]) / ((b[0] - a[0]) * 1e-9) for a, b in pairwise(velocities)]
     assert max(abs(b - a) / 0.02 for a, b in pairwise(speeds)) < 1.1
-
-
-def test_random_strokes_stay_within_the_stroke_and_are_at_least_half_as_long():
-    for seed in range(20):
-        ends = StrokeEnds(0.02, 0.01, np.random.default_rng(seed))
-        places = [0.0]
-        for number in range(20):
-            places.append(ends.draw(number % 2 == 0, places[-1]))
-        assert min(places) >= 0.0 and max(places) <= 0.02
-        lengths = [abs(b - a) for a, b in pairwise(places)]
-        assert min(lengths) >= 0.01 - 1e-12
-        assert np.ptp(lengths) > 0.001
-
-
-def test_a_finger_rubs_at_random_places_and_turns_elsewhere_each_time(table):
-    assert table.explore(ExplorationRequest('in_hand_random', duration_s=10.0)).success
-    along = [place[0] for place in table.places]
-    assert min(along) > -0.0005 and max(along) < 0.0205
-    along = [place[0] for _, place in sliding(table)]
-    turns = [b for a, b, c in zip(along, along[1:], along[2:], strict=False) if (b - a) * (c - b) < 0]
-    assert len({round(place, 4) for place in turns}) > 4  # without chance it turns at two; chance may repeat one
 
 
 # --------------------

@@ -42,7 +42,6 @@ PUBLISHED = {
     'ets-roughness': {'speed_m_s': {0.15}, 'force_n': {2.5}, 'distance_m': {0.105}, 'repeats': 200},
     'jamali': {'force_n': {1.0}, 'repeats': 50},
     'kaboli': {'duration_s': {2.0 + 2 * LATE_S}, 'repeats': 10},
-    'kaboli-random': {'distance_m': {0.03}, 'repeats': 10},
     'hu-cross': {'speed_m_s': {0.0255}, 'force_n': {1.5}, 'direction_rad': {0}, 'repeats': 60},
     'hu': {
         'speed_m_s': {0.0255},

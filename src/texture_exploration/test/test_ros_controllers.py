@@ -373,7 +373,6 @@ def test_every_motion_succeeds_behind_a_late_controller(motion):
     requests = {
         'circular': {'speed_m_s': 0.05, 'turns': 0.5},
         'in_hand_sliding': {'duration_s': 1.0},
-        'in_hand_random': {'duration_s': 1.0},
     }
     outcome = robot.explore(ExplorationRequest(motion, **requests.get(motion, {'distance_m': 0.02})))
     assert outcome.success, outcome.message
