@@ -126,7 +126,6 @@ class RosControllersArm(SurfaceArm):
         self._topics: ControllerTopics | None = None
         self._thread: threading.Thread | None = None
         self._closing = threading.Event()
-        self._late = 0
         self._restart()
 
     def check(self) -> None:
@@ -137,11 +136,7 @@ class RosControllersArm(SurfaceArm):
         DeviceError
             If one of them does not come within `connect_timeout_s`; it names which.
         """
-        topics = self._begin()
-        try:
-            self._wait_for_controllers(topics)
-        finally:
-            topics.close()
+        self._reached().close()
 
     def connect(self) -> None:
         """Wait for the first pose, the first force and a controller that subscribes, and begin to command.
@@ -151,12 +146,7 @@ class RosControllersArm(SurfaceArm):
         DeviceError
             If one of them does not come within `connect_timeout_s`; it names which.
         """
-        topics = self._begin()
-        try:
-            self._wait_for_controllers(topics)
-        except DeviceError:
-            topics.close()
-            raise
+        topics = self._reached()
         self._closing.clear()
         self._topics = topics
         if self._own_thread:
@@ -244,10 +234,7 @@ class RosControllersArm(SurfaceArm):
     def counts(self) -> Mapping[str, int]:
         """Totals of this connection."""
         self._connected()
-        return {
-            'zeroed': self._tool.zero.zeroings,
-            'late_periods': self._late,
-        }
+        return {'zeroed': self._tool.zero.zeroings}
 
     def step(self) -> None:
         """Take what was measured, and send what the newest command needs now; zero velocity if that fails.
@@ -289,11 +276,17 @@ class RosControllersArm(SurfaceArm):
         self._carry_out(topics, self._due(now_ns), held_s)
         topics.beat(moving=not self._tool.rest.at_rest)
 
-    def _begin(self) -> ControllerTopics:
-        """Close an earlier connection, and open the topics of a new one."""
+    def _reached(self) -> ControllerTopics:
+        """Close an earlier connection; return the topics of a new one, once all is there."""
         self.close()
         self._restart()
-        return self._open_topics(self._params)
+        topics = self._open_topics(self._params)
+        try:
+            self._wait_for_controllers(topics)
+        except BaseException:
+            topics.close()
+            raise
+        return topics
 
     def _restart(self) -> None:
         params = self._params
@@ -442,12 +435,8 @@ class RosControllersArm(SurfaceArm):
         try:
             while not self._closing.is_set():
                 self.step()
-                due_s += period_s
-                left_s = due_s - time.monotonic()
-                if left_s < -period_s:
-                    self._late += 1
-                    due_s = time.monotonic()
-                self._closing.wait(max(0.0, left_s))
+                due_s = max(due_s + period_s, time.monotonic())  # missed periods are not repeated
+                self._closing.wait(due_s - time.monotonic())
         finally:
             # Also when a bug ends the loop: no arm is left moving.
             topics.send_velocity(REST)
