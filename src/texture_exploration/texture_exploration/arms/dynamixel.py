@@ -13,9 +13,7 @@ import sys
 import termios
 import threading
 import time
-from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import serial
@@ -60,7 +58,6 @@ FIRMWARE = 6  # address of its version, of one byte, in all control tables of pr
 TRIPPED = 0xFF  # the register of the Bus Watchdog after it has stopped the motor
 RESTART_S = 3.0  # a motor has rebooted within
 SILENT = 'does not answer'
-GARBLED = 'answers with data that cannot be read: do two motors have this id, or is the cable damaged?'
 RESET = 'has lost its torque: it was reset, for example by a voltage drop'
 REMEDY = "; when it has cooled and nothing blocks it, reboot it (service '~/reboot') or switch its power off and on"
 HARDWARE_ERRORS = {0: 'input voltage', 2: 'overheating', 3: 'encoder', 4: 'electrical shock', 5: 'overload'}
@@ -125,7 +122,6 @@ class DynamixelBus:
         first, last = X_SERIES['torque_enable'], X_SERIES['goal_current']
         self._health = (first[0], last[0] + last[1] - first[0])
         self._turn = 0
-        self._garbled = False  # the last answer
 
     def close(self) -> None:
         """Close the port; never raises."""
@@ -165,20 +161,17 @@ class DynamixelBus:
         """Set mode, limits and goals of a motor without torque; return whether it answers."""
         profile = self._profile
         model, result = self._ping(motor)
-        self._garbled = result == self._sdk.COMM_RX_CORRUPT
         position = self.read_register(motor, 'present_position') if result == SUCCESS else None
         if position is None:
-            if self._garbled:
-                self._reasons[motor] = f'{profile.owner(motor)} {GARBLED}'
             return False
-        if model not in profile.models:  # or it is a late answer to an earlier request
+        if model != profile.model:  # or it is a late answer to an earlier request
             model, result = self._ping(motor)
             if result != SUCCESS:
                 return False
-        if model not in profile.models:
+        if model != profile.model:
             raise DeviceError(
                 f"{profile.owner(motor)} is of model {describe(model)}; the profile '{profile.name}' is for "
-                f'{", ".join(map(describe, profile.models))}, and with another its forces would be wrong; use a '
+                f'{describe(profile.model)}, and with another its forces would be wrong; use a '
                 'profile for this model'
             )
         self.write(motor, 'torque_enable', 0)  # or the mode cannot be set
@@ -355,7 +348,6 @@ class DynamixelBus:
         address, size = X_SERIES[register]
         for _ in range(TRIES):
             data, result = self._read_block(motor, address, size)
-            self._garbled = result == self._sdk.COMM_RX_CORRUPT
             if result == SUCCESS:
                 value = int.from_bytes(data, 'little')
                 return signed(value, size) if size > 1 else value
@@ -478,15 +470,12 @@ CLOSING_M_S = 0.02  # speed of a finger that comes down to press
 REACH_RAD = 0.3  # largest depth of the goal of a pressing motor within the object
 SLACK_RAD = 0.2  # largest distance between the goal and a blocked motor
 LONGEST_STEP_S = 0.05
-RATE_CYCLES = 40  # over which the rate is measured
-SLOW_FRACTION = 0.7  # of the rate of the profile, below which a warning is given
-LATENCY_FILE = '/sys/class/tty/{}/device/latency_timer'  # of adapters by FTDI, ms
 LIMITS = CommandLimits()
 NOT_CONNECTED = 'the hand is not connected; connect it first'
 
 
 class DynamixelHand:
-    """See `texture_exploration.arms.hand.Hand`. One thread owns the bus.
+    """Hold with some fingers, and move others as an arm does; one thread owns the bus.
 
     A motor that is missing or reports an error is named in the fault of the state until the hand is connected again;
     the others go on. However the thread or the process ends, the torque is switched off: by the thread itself, by a
@@ -502,7 +491,7 @@ class DynamixelHand:
         self._fingers = {name: DynamixelFinger(joints, self.profile) for name, joints in self.profile.fingers.items()}
         self._state: HandState | None = None
         self._failure = NOT_CONNECTED
-        self._warning = self._doubt = ''
+        self._doubt = ''
         self._highest_a: Mapping[int, float] = {}
         self._grip: Mapping[str, float] = {}
         self._commands: dict[str, tuple[ArmCommand, float]] = {}
@@ -515,7 +504,7 @@ class DynamixelHand:
         self.close()
         self._closing.clear()
         self._fresh.clear()
-        self._failure = self._warning = self._doubt = ''
+        self._failure = self._doubt = ''
         self._thread = threading.Thread(target=self._run, name='dynamixel', daemon=True)
         self._thread.start()
         if not self._fresh.wait(FIRST_STATE_S) or self._failure:
@@ -540,7 +529,7 @@ class DynamixelHand:
 
     def warning(self) -> str:
         """Return what is not as it should be although the hand moves, '' if nothing."""
-        return '; '.join(filter(None, (self._doubt, self._warning)))
+        return self._doubt
 
     def grip(self, forces_n: Mapping[str, float]) -> None:
         """Press from the next cycle on."""
@@ -619,7 +608,6 @@ class DynamixelHand:
             finger.restart()
         now_s = stepped_s = time.monotonic()
         errors: dict[str, None] = {}
-        cycles: deque[float] = deque(maxlen=RATE_CYCLES)
         while not self._closing.wait(max(0.0, now_s + period_s - time.monotonic())):
             now_s = time.monotonic()
             motors = bus.read()
@@ -633,8 +621,6 @@ class DynamixelHand:
             stepped_s = now_s
             self._publish(self._fault(bus, errors))
             bus.write_goals(goals)
-            cycles.append(now_s)
-            self._warning = self._slowness(cycles)
 
     def _doubtful(self, deaf: Iterable[int]) -> str:
         """Return a warning about motors whose watchdog may not stop them, '' if there are none."""
@@ -644,21 +630,6 @@ class DynamixelHand:
         return (
             f'the watchdog of motors {numbers} may not stop them when the cable is out or the computer hangs: their '
             'firmware is known to go on; update it with DYNAMIXEL Wizard'
-        )
-
-    def _slowness(self, cycles: Sequence[float]) -> str:
-        """Return a warning about the rate of the cycles that began at these times, '' if they are fast enough."""
-        if len(cycles) < RATE_CYCLES:
-            return self._warning
-        rate_hz = (len(cycles) - 1) / (cycles[-1] - cycles[0])
-        if rate_hz >= SLOW_FRACTION * self.profile.rate_hz:
-            return ''
-        latency = Path(LATENCY_FILE.format(Path(self._device).resolve().name))
-        adapter = f' (now {latency.read_text().strip()} ms)' if latency.is_file() else ''
-        return (
-            f'the bus makes {rate_hz:.0f} of {self.profile.rate_hz:g} cycles a second: set the latency timer of '
-            f"the USB adapter to 1 ms{adapter}, raise the baud rate ({self.profile.baud}) or lower 'rate_hz' of the "
-            f"profile '{self.profile.name}'"
         )
 
     def _step(self, motors: Mapping[int, MotorState], dt_s: float, now_s: float) -> dict[int, tuple[float, float]]:

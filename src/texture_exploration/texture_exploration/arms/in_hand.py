@@ -13,7 +13,7 @@ from texture_core.errors import DeviceError
 from texture_core.types import DEVICES
 from texture_exploration.arms.arm import Arm, ArmCommand, ArmState, Vector
 from texture_exploration.arms.dynamixel import DynamixelHand
-from texture_exploration.arms.hand import FingerSet, Fingertip, Hand, SimulatedHand
+from texture_exploration.arms.hand import FingerSet, Fingertip, SimulatedHand
 from texture_exploration.safety import CommandLimits
 
 HELD_FRACTION = 0.8  # of the wanted force: a finger that presses with it holds the object
@@ -35,6 +35,7 @@ class InHandParams(CommandLimits):
     device: str = param(f'{DEVICES}/dynamixel', 'Path of the serial device of a Dynamixel hand.')
 
 
+Hand = DynamixelHand | SimulatedHand
 HANDS: Mapping[str, Callable[[InHandParams], Hand]] = {
     'simulated': lambda params: SimulatedHand(limits=params),
     'dynamixel': lambda params: DynamixelHand(params.profile, params.device, params),
