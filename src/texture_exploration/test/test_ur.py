@@ -520,8 +520,6 @@ def test_slow_acknowledgements_of_stops_and_zeroing_do_not_trip_the_watchdog(lat
     assert arm.state().fault == ''
     counts = arm.counts
     assert (counts['refused'], counts['zeroed'] >= 1) == (0, True)
-    assert counts['slow_acknowledgements'] >= 3  # a stop that follows closely on another is not acknowledged by itself
-    assert 300 <= counts['slowest_acknowledgement_ms'] < 1000
 
 
 def test_after_a_slow_acknowledgement_the_watchdog_guards_the_moving_arm_as_before(late):

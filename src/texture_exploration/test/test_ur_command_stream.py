@@ -13,14 +13,13 @@ from texture_exploration.arms import ur as ur_probe
 from texture_exploration.arms.arm import ArmCommand
 from texture_exploration.arms.ur import (
     COMMAND,
-    STOP_DECELERATION_M_S2,
     UrArm,
     UrArmParams,
     UrCommand,
     UrReport,
     command_of,
 )
-from texture_exploration.arms.ur_worker import UrCommandStream, Watchdog
+from texture_exploration.arms.ur_worker import STOP_DECELERATION_M_S2, UrCommandStream, Watchdog
 from texture_exploration.explorer import Explorer
 from texture_exploration.safety import SafetyLimits
 from texture_exploration.touch import TouchParams
@@ -232,7 +231,7 @@ def watchdog_of(control):
     return Watchdog(control, WATCHED, guard=lambda seconds: None, clock=lambda: control.now_s)
 
 
-def test_a_slow_command_does_not_trip_it_and_is_counted():
+def test_a_slow_command_does_not_trip_it():
     control = TimedControl()
     watchdog = watchdog_of(control)
     assert watchdog.arm()
@@ -243,7 +242,6 @@ def test_a_slow_command_does_not_trip_it_and_is_counted():
     assert watchdog.armed
     assert not control.tripped
     assert control.period_s == pytest.approx(0.1)
-    assert (watchdog.slow, watchdog.slowest_s) == (1, pytest.approx(0.3))
 
 
 def test_a_controller_that_acknowledges_the_watchdog_itself_late_is_given_more_time():

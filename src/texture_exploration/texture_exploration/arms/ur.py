@@ -15,8 +15,8 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Mapping
-from contextlib import closing
+from collections.abc import Iterator, Mapping
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -51,13 +51,9 @@ class TcpConnection:
         try:
             self._socket = socket.create_connection((ip, port), timeout_s)
         except OSError as error:
-            if isinstance(error, ConnectionRefusedError):
-                raise DeviceError(
-                    f"nothing listens on {self._where}; is the controller on, and is parameter 'ip' its address?"
-                ) from error
-            raise DeviceError(
-                f"{self._where} cannot be reached: {error}; is the controller on, and is parameter 'ip' its address?"
-            ) from error
+            refused = isinstance(error, ConnectionRefusedError)
+            why = f'nothing listens on {self._where}' if refused else f'{self._where} cannot be reached: {error}'
+            raise DeviceError(f"{why}; is the controller on, and is parameter 'ip' its address?") from error
 
     def close(self) -> None:
         """Close the connection."""
@@ -65,22 +61,17 @@ class TcpConnection:
 
     def send(self, data: bytes) -> None:
         """Send all of it."""
-        try:
+        with self._answering():
             self._socket.sendall(data)
-        except OSError as error:
-            raise self._silent() from error
 
     def read(self, size: int) -> bytes:
-        """Return exactly `count` bytes."""
+        """Return exactly `size` bytes."""
         data = b''
         while len(data) < size:
-            try:
-                self._socket.settimeout(max(0.001, self._end_s - time.monotonic()))
+            with self._answering():
                 chunk = self._socket.recv(size - len(data))
-            except OSError as error:
-                raise self._silent() from error
-            if not chunk:
-                raise self._silent()
+                if not chunk:
+                    raise ConnectionError
             data += chunk
         return data
 
@@ -91,11 +82,16 @@ class TcpConnection:
             line += self.read(1)
         return line.decode('utf-8', 'replace').strip()
 
-    def _silent(self) -> DeviceError:
-        return DeviceError(
-            f'{self._where} takes connections but does not answer as a UR controller within {self._timeout_s:g} s; '
-            "wait until it has started, restart it, or correct parameter 'ip'"
-        )
+    @contextmanager
+    def _answering(self) -> Iterator[None]:
+        self._socket.settimeout(max(0.001, self._end_s - time.monotonic()))
+        try:
+            yield
+        except OSError as error:
+            raise DeviceError(
+                f'{self._where} takes connections but does not answer as a UR controller within {self._timeout_s:g} s; '
+                "wait until it has started, restart it, or correct parameter 'ip'"
+            ) from error
 
 
 # --------------------
@@ -124,9 +120,7 @@ class UrReport(NamedTuple):
     watchdog waits.
 
     `counts` are totals since the arm was connected. `late`: gaps of more than 20 ms in what the controller sends.
-    `refused`: commands that it did not accept. `zeroed`: zeroings of the force sensor. `slow_acknowledgements`:
-    commands that took longer than the watchdog waits while the arm moves; `slowest_acknowledgement_ms`: the longest
-    that any took.
+    `refused`: commands that it did not accept. `zeroed`: zeroings of the force sensor.
     """
 
     time_ns: int
@@ -180,7 +174,6 @@ class UrArmParams(ZeroingParams, SurfacePoseParams, CommandLimits):
 
 RATE_HZ = 250.0  # of commands and states: half of that of an e-Series
 DELAY_S = 0.02  # from a force to the motion that responds to it: walls were pressed with 26 to 40 N at 50 mm/s
-ACCELERATION_M_S2 = 2.0  # towards a new velocity: 50 mm/s after 25 ms
 ACKNOWLEDGE_S = (
     1.0  # time that a controller may take to stop, to end force control and to zero; its watchdog waits as long
 )
@@ -309,12 +302,6 @@ SAFETY_FAULTS: Mapping[int, str] = {
     12: 'safeguard stop of the automatic mode',
     13: 'three-position enabling stop',
 }
-
-# Force control about a fixed frame; the other axes may deviate by 0.1 m and 20°, as in PolyScope.
-FORCE_FRAME_FIXED = 2
-FORCE_DEVIATION_M = 0.1
-FORCE_DEVIATION_RAD = 0.349
-STOP_DECELERATION_M_S2 = 10.0  # the default of ur-rtde
 
 
 # --------------------
