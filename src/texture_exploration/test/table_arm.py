@@ -57,9 +57,6 @@ class TableArm(SimulatedArm):
         self.true_force_n = 0.0
         super().connect()
 
-    def doubt(self):
-        return self._loop.doubt if self._loop else ''
-
     def freeze(self):
         """Hang like a controller: an old state, no effect of commands."""
         self._frozen = True
@@ -99,6 +96,7 @@ class TableArm(SimulatedArm):
             due_ns = self._clock() + round(self._params.loop_delay_s * 1e9)
             command = self._last_command[0]
             self._coming.append((due_ns, self._loop.velocity(command, self._state, min(dt_s, HOLDS_S))))
+            self._state = replace(self._state, unsafe=self._loop.doubt)
 
     def _force_n(self, x_m, z_m):
         depth_m = self._shape.height_m(x_m) - z_m

@@ -74,7 +74,7 @@ MISTAKES = [
     ({'sped_m_s': 1.0}, InvalidParameter, "preset 'mine': no key 'sped_m_s'; did you mean 'speed_m_s'"),
     ({'force_n': 'hard'}, InvalidParameter, "'force_n' is 'hard'; a number is needed"),
     *(({'force_n': one}, InvalidParameter, r"'force_n' is .*; at most 1e\+06 is allowed") for one in HUGE),
-    ({'vary': {'force_n': 2.0}}, InvalidParameter, 'a list of numbers is needed'),
+    ({'vary': {'force_n': 2.0}}, InvalidParameter, 'each a list of numbers'),
     ({'slide_s': 1.0}, InvalidParameter, "'slide_s' needs 'speed_m_s'"),
     ({'repeats': 0}, InvalidParameter, "'repeats' is 0"),
 ]

@@ -276,7 +276,6 @@ class Exploration:
                 ExplorationError.WORKSPACE,
                 f'the finger left the workspace: {outside}' if outside and self._entered else '',
             ),
-            (ExplorationError.ARM_FAULT, self._arm.doubt()),
             (ExplorationError.NO_SIGNAL, self._signal_fault(self._listening)),
             (ExplorationError.TIMEOUT, self._overdue(now_ns)),
         )

@@ -141,10 +141,6 @@ class Arm:
         """Return a warning in a sentence although the arm moves, '' if there is none."""
         return ''
 
-    def doubt(self) -> str:
-        """Return in a sentence why a motion must end although the arm obeys and can still lift, '' if none."""
-        return ''
-
     @property
     def zeroed(self) -> bool:
         """Whether the force is a measure of contact: not before an arm that zeroes its sensor itself has done so."""

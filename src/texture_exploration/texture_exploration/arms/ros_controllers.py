@@ -274,6 +274,7 @@ class RosControllersArm(SurfaceArm):
         self._state = replace(self._tool.state(fault), unsafe=self._unsafe)
         self._zeroed = self._tool.zero.zeroed  # after the state, so that a reader finds the zeroed force
         self._carry_out(topics, self._due(now_ns), held_s)
+        self._state = replace(self._state, unsafe=self._unsafe or self._loop.doubt)
         topics.beat(moving=not self._tool.rest.at_rest)
 
     def _reached(self) -> ControllerTopics:
@@ -303,10 +304,6 @@ class RosControllersArm(SurfaceArm):
         self._unsafe = ''  # why it may only be lifted, until it is recovered or connected again
         self._lost = ''  # a fault that stays as long
         self._failed = ''  # with an internal error
-
-    def doubt(self) -> str:
-        """Return in a sentence that the force is too late for force control, '' if not."""
-        return self._loop.doubt
 
     def warning(self) -> str:
         """Return in a sentence that clocks do not agree, '' if they do."""
