@@ -320,15 +320,15 @@ def test_an_arm_that_was_never_connected_says_so():
 
 
 @pytest.mark.parametrize(
-    ('version', 'said'),
+    ('answer', 'said'),
     [
-        ((3, 3), r'3\.3.*update it to 3.12 or newer'),
-        ((5, 4), r'5\.4.*update it to 5.6 or newer'),
-        ((1, 8), r'1\.8.*update it to 3.12 or newer'),
-        ((10, 10), r"10\.10 \(PolyScope X\) without a dashboard.*use the arm 'ros_controllers'"),
+        ('3.3.4.310 (Mar 29 2017)', r'has the software 3\.3.*update it to 3.12 or newer'),
+        ('URSoftware 5.4.0.76974 (Jul 16 2019)', r'has the software 5\.4.*update it to 5.6 or newer'),
+        ('URSoftware 1.8.16941', r'has the software 1\.8.*update it to 3.12 or newer'),
+        ('who are you?', 'when asked for its version'),
     ],
 )
-def test_a_controller_that_is_too_old_or_has_no_dashboard_is_refused(version, said, monkeypatch):
-    monkeypatch.setattr(ur_probe, 'rtde_version', lambda ip, timeout_s: version)
-    with pytest.raises(DeviceError, match=f'has the software {said}'):
-        UrArm(UrArmParams(ip='127.0.0.82')).connect()
+def test_a_controller_that_is_too_old_or_does_not_say_its_version_is_refused(answer, said):
+    with pytest.raises(DeviceError, match=said):
+        ur_probe._checked_version('127.0.0.82', answer)
+    assert ur_probe._checked_version('127.0.0.82', '3.15.8.106339') == (3, 15)

@@ -4,19 +4,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import importlib.util
 import json
 import os
+import re
 import signal
 import socket
-import struct
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator, Mapping
-from contextlib import closing, contextmanager
+from collections.abc import Mapping
+from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -36,63 +37,6 @@ from texture_exploration.arms.arm import (
     tangential_force_n,
 )
 from texture_exploration.safety import CommandLimits
-
-# --------------------
-# A TCP connection to a controller, with a time limit on every answer.
-
-
-class TcpConnection:
-    """A TCP connection with a time limit on every wait, and a message for every failure."""
-
-    def __init__(self, ip: str, port: int, timeout_s: float) -> None:
-        self._where = f'{ip}:{port}'
-        self._timeout_s = timeout_s
-        self._end_s = time.monotonic() + timeout_s
-        try:
-            self._socket = socket.create_connection((ip, port), timeout_s)
-        except OSError as error:
-            refused = isinstance(error, ConnectionRefusedError)
-            why = f'nothing listens on {self._where}' if refused else f'{self._where} cannot be reached: {error}'
-            raise DeviceError(f"{why}; is the controller on, and is parameter 'ip' its address?") from error
-
-    def close(self) -> None:
-        """Close the connection."""
-        self._socket.close()
-
-    def send(self, data: bytes) -> None:
-        """Send all of it."""
-        with self._answering():
-            self._socket.sendall(data)
-
-    def read(self, size: int) -> bytes:
-        """Return exactly `size` bytes."""
-        data = b''
-        while len(data) < size:
-            with self._answering():
-                chunk = self._socket.recv(size - len(data))
-                if not chunk:
-                    raise ConnectionError
-            data += chunk
-        return data
-
-    def read_line(self) -> str:
-        """Return the next line."""
-        line = b''
-        while not line.endswith(b'\n'):
-            line += self.read(1)
-        return line.decode('utf-8', 'replace').strip()
-
-    @contextmanager
-    def _answering(self) -> Iterator[None]:
-        self._socket.settimeout(max(0.001, self._end_s - time.monotonic()))
-        try:
-            yield
-        except OSError as error:
-            raise DeviceError(
-                f'{self._where} takes connections but does not answer as a UR controller within {self._timeout_s:g} s; '
-                "wait until it has started, restart it, or correct parameter 'ip'"
-            ) from error
-
 
 # --------------------
 # Messages between the arm and its worker process: datagrams on a socket pair, a letter and JSON in each.
@@ -273,18 +217,12 @@ class WorkerLink:
 #
 # Source: the RTDE guide and the dashboard guide of Universal Robots.
 
-RTDE_PORT = 30004
 DASHBOARD_PORT = 29999
-FIRST_WITHOUT_DASHBOARD = 10  # PolyScope X: neither its safety nor its programs can be asked for
 FIRST_WITH_REMOTE_CONTROL = (5, 6)
 # Oldest software by series: the oldest CB3 that ur-rtde 1.6.5 is tested with (its README); an e-Series with remote
 # control.
 OLDEST: Mapping[int, tuple[int, int]] = {3: (3, 12), 5: (5, 6)}
 CB3 = 3  # the series without a force sensor in the flange
-
-REQUEST_VERSION = 86  # 'V', types of RTDE messages
-CONTROLLER_VERSION = 118  # 'v'
-PROTOCOL_VERSION = 2
 
 PROGRAM_PLAYING = 2  # runtime_state
 
@@ -309,52 +247,58 @@ SAFETY_FAULTS: Mapping[int, str] = {
 #
 # ur-rtde waits without a limit for a controller that does not answer; so it only connects to one that does.
 
-HEADER = struct.Struct('>HB')
 FREE_MODES = ('NORMAL', 'REDUCED')
 UNLOCK_WAIT_S = 8.0  # the controller refuses for 5 s
 UNLOCK_RETRY_S = 0.25
 
 
-def rtde_version(ip: str, timeout_s: float) -> tuple[int, int]:
-    """Return the major and minor version of the controller."""
-    with closing(TcpConnection(ip, RTDE_PORT, timeout_s)) as line:
-        _ask(line, REQUEST_VERSION, struct.pack('>H', PROTOCOL_VERSION))
-        answer = _ask(line, CONTROLLER_VERSION, b'')
-    if len(answer) < 8:
-        raise DeviceError(f'{ip}:{RTDE_PORT} does not report its version; is it a UR controller?')
-    major, minor = struct.unpack_from('>2I', answer)
-    return major, minor
-
-
-def _ask(line: TcpConnection, kind: int, payload: bytes) -> bytes:
-    """Send a message and return the payload of the answer of the same type; others, such as texts, are skipped."""
-    line.send(HEADER.pack(HEADER.size + len(payload), kind) + payload)
-    while True:
-        size, answered = HEADER.unpack(line.read(HEADER.size))
-        answer = line.read(max(0, size - HEADER.size))
-        if answered == kind:
-            return answer
-
-
-class DashboardClient(TcpConnection):
-    """The dashboard server of a controller: one line per request, one line per answer."""
+class DashboardClient:
+    """The dashboard server of a controller: one line per request, one line per answer, all within a time limit."""
 
     def __init__(self, ip: str, timeout_s: float) -> None:
-        super().__init__(ip, DASHBOARD_PORT, timeout_s)
-        self.read_line()  # its greeting
+        self._where = f'{ip}:{DASHBOARD_PORT}'
+        self._timeout_s = timeout_s
+        self._end_s = time.monotonic() + timeout_s
+        try:
+            self._socket = socket.create_connection((ip, DASHBOARD_PORT), timeout_s)
+        except OSError as error:
+            refused = isinstance(error, ConnectionRefusedError)
+            why = f'nothing listens on {self._where}' if refused else f'{self._where} cannot be reached: {error}'
+            raise DeviceError(
+                f"{why}; is the controller on, and is parameter 'ip' its address? PolyScope X has no dashboard: for it "
+                "use the arm 'ros_controllers' with ur_robot_driver"
+            ) from error
+        self._read_line()  # its greeting
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._socket.close()
 
     def ask(self, line: str) -> str:
         """Return the answer to a command."""
-        self.send(line.encode() + b'\n')
-        return self.read_line()
+        with contextlib.suppress(OSError):  # reading names what is wrong
+            self._socket.sendall(line.encode() + b'\n')
+        return self._read_line()
+
+    def _read_line(self) -> str:
+        line = b''
+        while not line.endswith(b'\n'):
+            self._socket.settimeout(max(0.001, self._end_s - time.monotonic()))
+            with contextlib.suppress(OSError):
+                if byte := self._socket.recv(1):
+                    line += byte
+                    continue
+            raise DeviceError(
+                f'{self._where} takes connections but does not answer as a UR controller within {self._timeout_s:g} s; '
+                "wait until it has started, restart it, or correct parameter 'ip'"
+            )
+        return line.decode('utf-8', 'replace').strip()
 
 
 def check_ready(ip: str, timeout_s: float) -> tuple[int, int]:
     """Return the version of a controller whose arm can move."""
-    end_s = time.monotonic() + timeout_s
-    version = rtde_version(ip, timeout_s)
-    _check_version(ip, version)
-    with closing(DashboardClient(ip, max(0.1, end_s - time.monotonic()))) as dashboard:
+    with closing(DashboardClient(ip, timeout_s)) as dashboard:
+        version = _checked_version(ip, dashboard.ask('PolyscopeVersion'))
         mode = dashboard.ask('robotmode')
         if 'RUNNING' not in mode:
             raise DeviceError(f"the arm at {ip} answers '{mode}'; switch it on and release its brakes")
@@ -369,18 +313,21 @@ def check_ready(ip: str, timeout_s: float) -> tuple[int, int]:
     return version
 
 
-def _check_version(ip: str, version: tuple[int, int]) -> None:
-    if version[0] >= FIRST_WITHOUT_DASHBOARD:
+def _checked_version(ip: str, answer: str) -> tuple[int, int]:
+    """Return the major and minor version in an answer such as 'URSoftware 5.12.2.1101534 (Nov 02 2022)'."""
+    numbers = re.search(r'(\d+)\.(\d+)', answer)
+    if numbers is None:
         raise DeviceError(
-            f'the controller at {ip} has the software {version[0]}.{version[1]} (PolyScope X) without a dashboard, by '
-            "which the arm 'ur' checks safety and programs; use the arm 'ros_controllers' with ur_robot_driver"
+            f"the controller at {ip} answers '{answer}' when asked for its version; is it a UR controller?"
         )
+    version = int(numbers[1]), int(numbers[2])
     oldest = OLDEST.get(version[0], min(OLDEST.values()))
     if version < oldest:
         raise DeviceError(
             f'the controller at {ip} has the software {version[0]}.{version[1]}, which is too old for force control, '
             f'zeroing of the force sensor or the watchdog; update it to {oldest[0]}.{oldest[1]} or newer'
         )
+    return version
 
 
 def unlock_protective_stop(ip: str, timeout_s: float) -> None:
