@@ -35,6 +35,7 @@ PLANE = Shape()
 
 @dataclass(frozen=True)
 class TableArmParams(ForceLoopParams, SimulatedArmParams):
+    loop_delay_s: float = 0.008
     force_mode: bool = True
     force_noise_n: float = 0.001  # without a force mode
 

@@ -51,7 +51,7 @@ def press(loop, time_s, force_n):
 
 def stood(force_n, steps=60, **given):
     """Return the doubt after the first touch, of a finger that is to stand; `force_n` over the time in s."""
-    loop = ForceLoop(ForceLoopParams(**given), PERIOD_S)
+    loop = ForceLoop(ForceLoopParams(**{'loop_delay_s': 0.008, **given}), PERIOD_S)
     for step in range(steps):
         press(loop, step * PERIOD_S, force_n(step * PERIOD_S))
     return loop.doubt
@@ -65,7 +65,7 @@ def test_a_force_that_stands_as_the_finger_does_is_not_doubted():
 def test_a_pause_of_this_machine_after_the_touch_makes_no_force_late(pause_s):
     """The arm stood meanwhile: what rises until 'loop_delay_s' after the touch is no lateness."""
     assert stood(lambda s: 0.05 if s < 0.008 else 0.17, steps=1) == ''
-    loop = ForceLoop(ForceLoopParams(), PERIOD_S)
+    loop = ForceLoop(ForceLoopParams(loop_delay_s=0.008), PERIOD_S)
     times_s = [0.0, *(pause_s + step * PERIOD_S for step in range(60))]
     for time_s in times_s:
         press(loop, time_s, 0.05 if time_s < 0.008 else 0.17)

@@ -123,11 +123,7 @@ class ForceLoopParams:
     """Parameters of the force control of an arm without a force mode."""
 
     loop_delay_s: float = param(
-        0.008,
-        'Largest delay from a force to the motion that responds; larger: lower gain.',
-        unit='s',
-        low=0.0,
-        high=0.1,
+        0.02, 'Largest delay from a force to the motion that responds; larger: lower gain.', unit='s', low=0.0, high=0.1
     )
     max_stiffness_n_m: float = param(
         5000.0, 'Stiffest contact; larger: slower approach, lower gain.', unit='N/m', low=100.0, high=200000.0

@@ -380,11 +380,7 @@ class ZeroingParams:
     """When a finger counts as in free air; a base of the parameters of each arm that zeroes its force sensor there."""
 
     zero_steady_n: float = param(
-        0.5,
-        'Largest change of the smoothed force that counts as constant; it must exceed the noise of the sensor.',
-        unit='N',
-        low=0.05,
-        high=5.0,
+        0.5, 'Change of the force that counts as none; above the noise of its sensor.', unit='N', low=0.05, high=5.0
     )
 
 

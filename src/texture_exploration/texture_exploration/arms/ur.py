@@ -102,11 +102,7 @@ class UrArmParams(ZeroingParams, SurfacePoseParams, CommandLimits):
         0.2, 'How long a command holds without a new one; afterwards the arm stops.', unit='s', low=0.02, high=2.0
     )
     watchdog_hz: float = param(
-        10.0,
-        'Lowest rate of commands at which the controller keeps the arm moving; a higher rate stops it sooner.',
-        unit='Hz',
-        low=1.0,
-        high=50.0,
+        10.0, 'Rate of commands below which the controller stops the arm.', unit='Hz', low=1.0, high=50.0
     )
     silence_s: float = param(
         0.1, 'How long the controller may send no state before that is a fault.', unit='s', low=0.02, high=2.0
