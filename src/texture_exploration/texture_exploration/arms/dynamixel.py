@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
+import functools
 import importlib
 import math
 import os
@@ -100,7 +101,7 @@ class DynamixelBus:
         self.missing: set[int] = set()
         self.limits_a: dict[int, float] = {}
         self.deaf: set[int] = set()  # motors whose watchdog may not stop them
-        self._reasons: dict[int, str] = {}  # why a motor is missing, unless it is silent
+        self._reset: set[int] = set()  # motors that are missing as they have lost their torque
         self._energised: set[int] = set()
         self._goal_currents: dict[int, int] = {}  # as sent last
         self._device = device
@@ -151,11 +152,11 @@ class DynamixelBus:
             self.write(motor, 'torque_enable', 1)
             self._energised.add(motor)
             self.missing.discard(motor)
-            self._reasons.pop(motor, None)
+            self._reset.discard(motor)
 
     def why_missing(self, motor: int) -> str:
         """Return why a motor is missing, as text."""
-        return self._reasons.get(motor) or f'{self._profile.owner(motor)} {SILENT}'
+        return f'{self._profile.owner(motor)} {RESET if motor in self._reset else SILENT}'
 
     def _prepare(self, motor: int) -> bool:
         """Set mode, limits and goals of a motor without torque; return whether it answers."""
@@ -292,12 +293,7 @@ class DynamixelBus:
         data, result = self._read_block(motor, *self._health)
         if result != SUCCESS:
             return ''  # silence is detected elsewhere
-
-        def value(register: str) -> int:
-            address, size = X_SERIES[register]
-            at = address - self._health[0]
-            return int.from_bytes(data[at : at + size], 'little')
-
+        value = functools.partial(register_in, data, self._health[0])
         owner, watchdog = self._profile.owner(motor), self._profile.watchdog
         if bits := value('hardware_error'):
             return self._reported(motor, bits)
@@ -309,10 +305,10 @@ class DynamixelBus:
                 'computer or the bus was delayed; all motors were released'
             )
         if not value('torque_enable') or (watchdog and value('bus_watchdog') != watchdog):
-            self._reasons[motor] = f'{owner} {RESET}'
+            self._reset.add(motor)
             self._energised.discard(motor)
             self.missing.add(motor)
-        elif signed(value('goal_current'), 2) != self._goal_currents[motor]:
+        elif value('goal_current') != self._goal_currents[motor]:
             # A sync write is not answered. Lost or refused: this finds the reason.
             self.write(motor, 'goal_current', self._goal_currents[motor])
         return ''
@@ -349,8 +345,7 @@ class DynamixelBus:
         for _ in range(TRIES):
             data, result = self._read_block(motor, address, size)
             if result == SUCCESS:
-                value = int.from_bytes(data, 'little')
-                return signed(value, size) if size > 1 else value
+                return register_in(data, address, register)
         return None
 
     def _read_block(self, motor: int, address: int, size: int) -> tuple[bytes, int]:
@@ -386,15 +381,9 @@ class DynamixelBus:
         return model, result
 
     def _measured(self, data: bytes) -> MotorState:
-        profile = self._profile
-
-        def value(register: str) -> int:
-            address, size = X_SERIES[register]
-            at = address - self._block[0]
-            return int.from_bytes(data[at : at + size], 'little', signed=True)
-
+        value = functools.partial(register_in, data, self._block[0])
         return MotorState(
-            current_a=value('present_current') * profile.current_a,
+            current_a=value('present_current') * self._profile.current_a,
             velocity_rad_s=value('present_velocity') * VELOCITY_RAD_S,
             position_rad=(value('present_position') - ZERO) * POSITION_RAD,
         )
@@ -426,9 +415,10 @@ def _reasons(bits: int) -> str:
     return ' and '.join(known) or f'hardware error {bits:#04x}'
 
 
-def signed(value: int, size: int) -> int:
-    """Return a register of `size` bytes as a signed number: the SDK gives all as unsigned."""
-    return value - (1 << 8 * size) if value >> (8 * size - 1) & 1 else value
+def register_in(data: bytes, first: int, register: str) -> int:
+    """Return a register, signed if it is longer than a byte, of a part of the table from the address `first` on."""
+    address, size = X_SERIES[register]
+    return int.from_bytes(data[address - first : address - first + size], 'little', signed=size > 1)
 
 
 # --------------------
@@ -436,13 +426,6 @@ def signed(value: int, size: int) -> int:
 
 REPEATS = 5  # a sync write is not answered; one may collide with earlier bytes on the line
 PAUSE_S = 0.02
-
-
-class TorqueGuard(GuardProcess):
-    """The guard of one hand, which holds the lock on its device; start it before the torque is switched on."""
-
-    def __init__(self, device: str, baud: int, packet: bytes, lock: int) -> None:
-        super().__init__(__name__, device, str(baud), packet.hex(), holds=(lock,))
 
 
 def main() -> None:
@@ -479,7 +462,7 @@ class DynamixelHand:
 
     A motor that is missing or reports an error is named in the fault of the state until the hand is connected again;
     the others go on. However the thread or the process ends, the torque is switched off: by the thread itself, by a
-    `TorqueGuard` when the process is gone; and without a message for the time in the profile, the Bus Watchdog of the
+    guard process when the process is gone; and without a message for the time in the profile, the Bus Watchdog of the
     motors stops them.
     """
 
@@ -582,7 +565,9 @@ class DynamixelHand:
         bus = guard = None
         try:
             bus = DynamixelBus(self._device, self.profile)
-            guard = TorqueGuard(self._device, self.profile.baud, bus.torque_off_packet(), bus.lock)
+            # It holds the lock on the device, and switches the torque off once this process is gone.
+            line = self._device, str(self.profile.baud), bus.torque_off_packet().hex()
+            guard = GuardProcess(__name__, *line, holds=(bus.lock,))
             self._highest_a = bus.limits_a
             bus.start()
             self._doubt = self._doubtful(bus.deaf)

@@ -63,8 +63,8 @@ class UrReport(NamedTuple):
     says that its sensor was zeroed since the arm was connected or recovered. `watchdog_s` is how long the controller's
     watchdog waits.
 
-    `counts` are totals since the arm was connected. `late`: gaps of more than 20 ms in what the controller sends.
-    `refused`: commands that it did not accept. `zeroed`: zeroings of the force sensor.
+    `counts` are totals since the arm was connected. `refused`: commands that the controller did not accept. `zeroed`:
+    zeroings of the force sensor.
     """
 
     time_ns: int

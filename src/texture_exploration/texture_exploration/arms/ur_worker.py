@@ -304,7 +304,6 @@ class Observer:
         self._stamp = -1.0
         self._time_ns = time.monotonic_ns()
         self._silent_for_s = 0.0
-        self._late = 0
 
     def run(self) -> None:
         """Check in every cycle for a new state."""
@@ -325,8 +324,7 @@ class Observer:
             self._silent_for_s, self.silent = 0.0, False
             self._report()
             return
-        previous_s, self._silent_for_s = self._silent_for_s, self._silent_for_s + passed_s
-        self._late += previous_s <= LATE_S < self._silent_for_s
+        self._silent_for_s += passed_s
         if self._silent_for_s > self._silence_s and not self.silent:
             self.silent = True
             self._report()
@@ -343,7 +341,7 @@ class Observer:
             playing=receive.getRuntimeState() == PROGRAM_PLAYING,
             silent=self.silent,
             zeroed=self.zeroed,
-            counts={'late': self._late, **self.counts},
+            counts=self.counts,
         )
         self.newest = report
         try:
