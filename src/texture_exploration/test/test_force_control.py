@@ -5,10 +5,8 @@
 from dataclasses import replace
 
 import pytest
-from table_arm import TableArmParams
 
 from texture_core.errors import InvalidParameter
-from texture_core.types import ExplorationRequest
 from texture_exploration.arms.arm import ArmCommand, ArmState
 from texture_exploration.force_control import (
     ForceController,
@@ -17,7 +15,6 @@ from texture_exploration.force_control import (
     LoopModel,
     spectral_radius,
 )
-from texture_exploration.touch import TouchParams
 
 PERIOD_S = 0.004
 
@@ -79,31 +76,3 @@ def test_a_force_that_goes_on_to_rise_is_named():
 def test_a_harder_touch_than_the_declared_contact_allows_is_named():
     expected = 'the force rose by 0.45 N after the first touch, and 0.33 N are the most to expect'
     assert stood(lambda s: 0.05 if s < 0.008 else 0.5).startswith(expected)
-
-
-# Declared and true stiffness in N/m, delay in ms, noise in mN.
-LOOPS = [
-    (declared, true, delay_ms, noise_mn)
-    for declared, true in ((20000.0, 20000.0), (20000.0, 5000.0), (20000.0, 600.0), (5000.0, 2000.0), (5000.0, 200.0))
-    for delay_ms in (8, 50)
-    for noise_mn in (3, 20)
-]
-
-
-@pytest.mark.parametrize('loop', LOOPS)
-def test_a_declared_stiffness_and_delay_press_with_a_fifth_too_much_at_most(make_table, loop):
-    declared, true, delay_ms, noise_mn = loop
-    arm = TableArmParams(
-        force_mode=False,
-        start_height_m=0.001,
-        max_stiffness_n_m=declared,
-        stiffness_n_m=true,
-        loop_delay_s=1e-3 * delay_ms,
-        max_impact_n=0.3,
-        force_noise_n=1e-3 * noise_mn,
-        touching_n=max(0.03, 6e-3 * noise_mn),
-    )
-    table = make_table(arm, TouchParams(approach_stiffness_n_m=declared))
-    outcome = table.explore(ExplorationRequest('linear_slide', speed_m_s=0.02, force_n=1.0, distance_m=0.01))
-    assert table.largest_n < 1.2
-    assert outcome.success or outcome.message.startswith('waited 10.0 s for the force to settle'), outcome.message

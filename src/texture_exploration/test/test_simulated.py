@@ -59,14 +59,6 @@ def test_above_the_surface_force_control_comes_down(clock):
     assert arm.state().force_n == pytest.approx(1.0, rel=1e-3)
 
 
-def test_an_arm_that_slept_moves_no_longer_than_a_command_holds(clock):
-    arm = make(clock, stiffness_n_m=2000.0, start_height_m=0.0)
-    clock.now_ns += 500_000_000
-    arm.command(ArmCommand(normal_m_s=-0.02))  # of one who sees an old state
-    arm.step(0.5)
-    assert arm.state().force_n == pytest.approx(2000.0 * 0.02 * 0.1)
-
-
 def test_a_command_moves_the_arm_no_longer_than_it_holds_however_late_the_step(clock):
     arm = make(clock)
     arm.command(ArmCommand(normal_m_s=0.02))
