@@ -258,11 +258,12 @@ class DashboardClient:
         try:
             self._socket = socket.create_connection((ip, DASHBOARD_PORT), timeout_s)
         except OSError as error:
-            refused = isinstance(error, ConnectionRefusedError)
-            why = f'nothing listens on {self._where}' if refused else f'{self._where} cannot be reached: {error}'
+            if not isinstance(error, ConnectionRefusedError):
+                what = "is the controller on, and is parameter 'ip' its address?"
+                raise DeviceError(f'{self._where} cannot be reached: {error}; {what}') from error
             raise DeviceError(
-                f"{why}; is the controller on, and is parameter 'ip' its address? PolyScope X has no dashboard: for it "
-                "use the arm 'ros_controllers' with ur_robot_driver"
+                f"nothing listens on {self._where}; is the controller on, and is parameter 'ip' its address? For "
+                "PolyScope X, which has no dashboard, use the arm 'ros_controllers' with ur_robot_driver"
             ) from error
         self._read_line()  # its greeting
 
