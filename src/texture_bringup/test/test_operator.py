@@ -116,7 +116,7 @@ def test_a_request_that_is_accepted_after_its_client_gave_up_is_cancelled_at_onc
         with operators.Operator(domain_id=DOMAIN, guard=press_ctrl_c) as operator:
             operator.wait_for_explorer(30.0)
             sent.append(True)
-            with pytest.raises((MotionAborted, KeyboardInterrupt)):
+            with pytest.raises((MotionAborted, KeyboardInterrupt), match='not confirmed'):
                 operator.explore(ExplorationRequest('linear_slide'))
         begin.set()
         deadline_s = time.monotonic() + 10.0

@@ -38,7 +38,6 @@ PRESETS = {
     'ets-roughness': 'ets-roughness-',
     'jamali': 'jamali-',
     'kaboli': 'kaboli-',
-    'kaboli-random': 'kaboli-',
     'hu': 'hu-',
     'hu-cross': 'hu-',
 }

@@ -112,7 +112,7 @@ FEATURES_DEADLINE_S = 30.0
 # hangs. ROS lists a killed one for another 20 s.
 GONE_S = 4.0
 # Time until a goal is accepted: it is short, unless the request has been lost with an explorer that just died.
-ACCEPT_S = 15.0
+ACCEPT_S, CONFIRM_S = 15.0, 1.0
 # Time to find a service, and time for its answer: an arm needs seconds to recover, a tare up to 65 s.
 OFFERED_S, ANSWER_S = 10.0, 75.0
 SETTINGS_S = 10.0  # to find the parameters of a node
@@ -236,9 +236,11 @@ class Operator:
         silent = 'the explorer accepts no request; stop it, and check that no second one runs'
         try:
             self._until(accepted.done, ACCEPT_S, silent, MotionAborted)
-        except MotionAborted:
-            self._withdraw(goal_id)
-            raise
+        except MotionAborted as error:
+            withdrawn = self._withdraw(goal_id)
+            self._executor.spin_until_future_complete(withdrawn, CONFIRM_S)
+            how = 'it has confirmed' if withdrawn.done() else 'look at the robot: it has not confirmed'
+            raise MotionAborted(f'{error}; {how} that the request is withdrawn') from error
         except KeyboardInterrupt:  # the explorer may have the request already
             self._withdraw(goal_id)
             self._executor.spin_until_future_complete(accepted, CANCEL_DEADLINE_S)
@@ -431,9 +433,10 @@ class Operator:
         self._guard()
         self._executor.spin_once(timeout_sec=STEP_S)
 
-    def _withdraw(self, goal_id: Any) -> None:
+    def _withdraw(self, goal_id: Any) -> Future:
         """Cancel a request that was not accepted: an explorer that accepts it later must not run it."""
-        ClientGoalHandle(self._explore, goal_id, action.Explore.Impl.SendGoalService.Response()).cancel_goal_async()
+        handle = ClientGoalHandle(self._explore, goal_id, action.Explore.Impl.SendGoalService.Response())
+        return handle.cancel_goal_async()
 
     def _cancel(self, goal: Any, ending: Future) -> str:
         """Cancel, wait until the finger is lifted, and return in a sentence how it ended."""

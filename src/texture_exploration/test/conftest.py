@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from texture_core.types import ExplorationRequest
-from texture_exploration.arms.simulated import PLANE, SimulatedArm, SimulatedArmParams
 from texture_exploration.exploration import Exploration, no_signal_watch
 from texture_exploration.explorer import Explorer
 from texture_exploration.motions import MOTIONS
@@ -18,7 +17,8 @@ from texture_exploration.safety import SafetyLimits
 from texture_exploration.touch import TouchParams
 from texture_simulation.devices.twist_controller import TwistControllerParams
 
-sys.path.append(str(Path(__file__).parent))  # where tests find the robot
+sys.path.append(str(Path(__file__).parent))  # where tests find the robots
+from table_arm import PLANE, TableArm, TableArmParams
 from twist_robot import Robot
 
 # The pure tests run where there is no ROS.
@@ -32,7 +32,7 @@ ROS_TESTS = [
 collect_ignore = [] if importlib.util.find_spec('rclpy') else ROS_TESTS
 
 ARM_STEP_NS = 5_000_000
-ARM, TOUCH, LIMITS = SimulatedArmParams(), TouchParams(), SafetyLimits()
+ARM, TOUCH, LIMITS = TableArmParams(), TouchParams(), SafetyLimits()
 LINEAR = ExplorationRequest('linear_slide')
 
 
@@ -41,7 +41,7 @@ class Table:
 
     def __init__(self, arm=ARM, touch=TOUCH, limits=LIMITS, shape=PLANE):
         self.now_ns = 1_000_000_000
-        self.arm = SimulatedArm(arm, clock=lambda: self.now_ns, own_thread=False, shape=shape)
+        self.arm = TableArm(arm, lambda: self.now_ns, shape)
         self.arm.connect()
         self.home = self.arm.state().position
         self.touch, self.limits = touch, limits
@@ -119,7 +119,7 @@ def make_robot():
 @pytest.fixture
 def explorer(monkeypatch):
     """Return an explorer over a table: a real thread on simulated time, which rests while `table.gate` is shut."""
-    table = Table(SimulatedArmParams(start_height_m=0.002))
+    table = Table(TableArmParams(start_height_m=0.002))
     table.gate = threading.Event()
     table.gate.set()
 

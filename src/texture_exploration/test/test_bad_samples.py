@@ -132,7 +132,7 @@ def test_a_command_that_the_arm_refuses_is_named_and_the_finger_is_lifted(table,
 
 def test_an_error_in_the_thread_of_the_arm_commands_zero_is_named_and_the_finger_lifted(make_robot):
     robot, raised = make_robot(), []
-    choose = robot.arm._velocity.choose
+    choose = robot.arm._loop.velocity
 
     def fail(*given):
         if robot.phases[-1:] == [Phase.SLIDE] and not raised:
@@ -140,7 +140,7 @@ def test_an_error_in_the_thread_of_the_arm_commands_zero_is_named_and_the_finger
             raise IndexError('list index out of range')
         return choose(*given)
 
-    robot.arm._velocity.choose = fail
+    robot.arm._loop.velocity = fail
     outcome = robot.explore(SLIDE)
     assert raised
     assert 'IndexError' in outcome.message
@@ -155,7 +155,7 @@ def test_an_error_that_stays_in_the_thread_of_the_arm_leaves_it_at_rest_and_name
         raise IndexError('list index out of range')
 
     outcome = robot.explore(
-        SLIDE, lambda state: setattr(robot.arm._velocity, 'choose', fail) if state.phase is Phase.SLIDE else None
+        SLIDE, lambda state: setattr(robot.arm._loop, 'velocity', fail) if state.phase is Phase.SLIDE else None
     )
     assert 'IndexError' in outcome.message and not outcome.lifted
     assert not any(robot.sent[-1][1])

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from texture_core.errors import CommandRefused, DeviceError
+from texture_core.errors import CommandRefused
 from texture_exploration.arms.arm import ArmCommand
 from texture_exploration.safety import CommandLimits
 
@@ -30,14 +30,9 @@ REFUSED = {
 @pytest.mark.parametrize('name', REFUSED)
 def test_a_command_out_of_range_is_refused_after_the_arm_was_stopped(name):
     stops = []
-    with pytest.raises(CommandRefused, match=r'was refused and the arm stopped: the .* is .*; allowed is .* to '):
+    with pytest.raises(CommandRefused, match=r'the arm stopped: the .* is \S+ (m/s|N); allowed is \S+ to \S+ (m/s|N)$'):
         LIMITS.check(REFUSED[name], lambda: stops.append('stop'))
     assert stops == ['stop']
-
-
-def test_the_sentence_reports_what_came_and_what_is_allowed():
-    with pytest.raises(CommandRefused, match=r'the speed along the normal is -5 m/s; allowed is -0\.5 to 0\.5 m/s$'):
-        LIMITS.check(ArmCommand(normal_m_s=-5.0))
 
 
 @pytest.mark.parametrize(
@@ -52,7 +47,3 @@ def test_the_sentence_reports_what_came_and_what_is_allowed():
 )
 def test_a_command_within_the_limits_passes_and_stops_nothing(command):
     LIMITS.check(command, lambda: pytest.fail('the arm was stopped'))
-
-
-def test_whoever_handles_errors_of_devices_handles_a_refused_command():
-    assert issubclass(CommandRefused, DeviceError)

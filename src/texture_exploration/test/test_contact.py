@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from table_arm import Shape, TableArmParams
 
 from texture_core.types import NANOSECONDS, ExplorationRequest, Phase, TactileSignal
-from texture_exploration.arms.simulated import SimulatedArmParams, SurfaceShape
 from texture_exploration.touch import TouchParams
 from texture_features.windows import CutWindow, WindowParams, cut_recording
 
 REQUEST = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.15)
-DROP = SurfaceShape(step_m=-0.012, step_from_m=0.06)
+DROP = Shape(step_m=-0.012)
 EDGE_IN_SLIDE_M = 0.06
 RATE_HZ = 1000.0
 WINDOWS = WindowParams(length_s=0.1, hop_s=0.02)
@@ -43,10 +43,10 @@ def least_touching(table):
     return min(window.windows['signal'].samples.mean() for window in windows), len(windows)
 
 
-@pytest.mark.parametrize('shape', [DROP, SurfaceShape(edge_m=EDGE_IN_SLIDE_M)], ids=['a drop', 'an edge'])
+@pytest.mark.parametrize('shape', [DROP, Shape(edge_m=EDGE_IN_SLIDE_M)], ids=['a drop', 'an edge'])
 @pytest.mark.parametrize('force_mode', [True, False])
 def test_a_surface_that_is_lost_in_the_slide_aborts_with_its_reason(make_table, shape, force_mode):
-    table = make_table(SimulatedArmParams(force_mode=force_mode, start_height_m=0.002), shape=shape)
+    table = make_table(TableArmParams(force_mode=force_mode, start_height_m=0.002), shape=shape)
     outcome = table.explore(REQUEST)
     assert not outcome.success
     assert outcome.message.startswith('the contact with the surface was lost for 1')
@@ -89,7 +89,7 @@ def test_a_rough_surface_that_the_finger_bounces_over_is_slid_on(make_table):
     ],
 )
 def test_a_surface_that_ends_counts_only_if_the_slide_was_whole(make_table, edge_m, success):
-    table = make_table(shape=SurfaceShape(edge_m=edge_m))
+    table = make_table(shape=Shape(edge_m=edge_m))
     outcome = table.explore(REQUEST)
     assert (outcome.success, table.arm.state().force_n) == (success, 0.0)
     if not success:
@@ -102,7 +102,7 @@ def test_contact_lost_on_the_last_step_of_the_slide_is_no_success(make_table):
     last_m = max(
         place[0] for state, place in zip(whole.states, whole.places, strict=True) if state.phase is Phase.SLIDE
     )
-    table = make_table(shape=SurfaceShape(edge_m=last_m - 0.0002))
+    table = make_table(shape=Shape(edge_m=last_m - 0.0002))
     outcome = table.explore(REQUEST)
     assert not outcome.success
     assert 'the contact with the surface was lost' in outcome.message
@@ -126,8 +126,8 @@ def test_finishing_while_the_contact_is_lost_is_no_success(make_table):
 @pytest.mark.parametrize(('force_mode', 'tilt_rad'), [(True, -0.1745), (True, 0.1745), (False, -0.02), (False, 0.02)])
 def test_a_tilted_surface_is_not_lost(make_table, tilt_rad, force_mode):
     """By 10 degrees with a force mode, by 1 degree with one gain for the stiffest contact."""
-    arm = SimulatedArmParams(force_mode=force_mode, start_height_m=0.005)
-    table = make_table(arm, shape=SurfaceShape(tilt_rad=tilt_rad))
+    arm = TableArmParams(force_mode=force_mode, start_height_m=0.005)
+    table = make_table(arm, shape=Shape(tilt_rad=tilt_rad))
     outcome = table.explore(replace(REQUEST, distance_m=0.05))
     assert outcome.success, outcome.message
 
@@ -148,7 +148,7 @@ def test_a_force_that_stays_just_above_the_limit_of_contact_is_no_success(make_t
 
 
 def test_a_force_at_the_edge_of_its_tolerance_is_a_success(table, monkeypatch):
-    monkeypatch.setattr(SimulatedArmParams, 'admittance_m_s_n', 7e-4)
+    monkeypatch.setattr(TableArmParams, 'admittance_m_s_n', 7e-4)
     table.when[Phase.SLIDE] = lambda: table.arm.push(-0.19)
     assert table.explore(REQUEST).success
 
@@ -162,7 +162,7 @@ def test_a_force_at_the_edge_of_its_tolerance_is_a_success(table, monkeypatch):
     ids=lambda request_: request_.motion,
 )
 def test_circles_and_strokes_that_leave_the_surface_abort_too(make_table, request_):
-    table = make_table(shape=SurfaceShape(edge_m=0.017))
+    table = make_table(shape=Shape(edge_m=0.017))
     outcome = table.explore(request_)
     assert not outcome.success
     assert 'the contact with the surface was lost' in outcome.message
@@ -170,7 +170,7 @@ def test_circles_and_strokes_that_leave_the_surface_abort_too(make_table, reques
 
 
 def test_a_slope_that_the_force_loop_cannot_follow_is_named(make_table):
-    table = make_table(SimulatedArmParams(force_mode=False, start_height_m=0.005), shape=SurfaceShape(tilt_rad=0.1745))
+    table = make_table(TableArmParams(force_mode=False, start_height_m=0.005), shape=Shape(tilt_rad=0.1745))
     outcome = table.explore(replace(REQUEST, distance_m=0.05))
     assert outcome.message.startswith('the force reached 1.2')
     assert outcome.lifted
@@ -178,14 +178,14 @@ def test_a_slope_that_the_force_loop_cannot_follow_is_named(make_table):
 
 @pytest.mark.parametrize('peak_n', [1.86, 3.0])
 def test_a_force_that_departs_in_the_slide_is_no_success_and_no_window_is_cut_from_it(table, peak_n, monkeypatch):
-    monkeypatch.setattr(SimulatedArmParams, 'admittance_m_s_n', 7e-4)  # it gives way slowly
+    monkeypatch.setattr(TableArmParams, 'admittance_m_s_n', 7e-4)  # it gives way slowly
     table.when[Phase.SLIDE] = lambda: setattr(table, 'pressed_ns', table.now_ns)
     table.pressed_ns = None
 
     def press():
         pressed_s = (table.now_ns - table.pressed_ns) * 1e-9 if table.pressed_ns else 0.0
         wanted_n = peak_n + 0.01 * math.sin(1e3 * pressed_s)  # a frozen force would be named instead
-        table.arm.push(wanted_n - table.arm.true_force_n + table.arm._push_n if 0.5 < pressed_s < 0.65 else 0.0)
+        table.arm.push(wanted_n - table.arm.true_force_n + table.arm.push_n if 0.5 < pressed_s < 0.65 else 0.0)
 
     table.at_each_step = press
     outcome = table.explore(ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.1))

@@ -6,10 +6,10 @@ from collections import deque
 from dataclasses import replace
 
 import pytest
+from table_arm import Shape, TableArmParams
 
 from texture_core.errors import ExplorationError
 from texture_core.types import ExplorationRequest, Phase
-from texture_exploration.arms.simulated import SimulatedArmParams, SurfaceShape
 from texture_exploration.guards import SignalWatch
 from texture_exploration.safety import SafetyLimits
 from texture_exploration.touch import TouchParams
@@ -59,7 +59,7 @@ def test_an_arm_that_hangs_in_the_lift_after_a_stop_is_reported_with_the_stop(ta
 
 
 def test_without_a_surface_the_approach_gives_up(make_table):
-    table = make_table(SimulatedArmParams(stiffness_n_m=0.0), TouchParams(approach_travel_m=0.02))
+    table = make_table(TableArmParams(stiffness_n_m=0.0), TouchParams(approach_travel_m=0.02))
     outcome = table.explore()
     assert outcome.error is ExplorationError.NO_SURFACE
     assert outcome.message.startswith('no surface within 0.02 m')
@@ -137,7 +137,7 @@ def test_a_slide_can_end_early_with_success_but_not_before_the_guaranteed_time(t
 
 def test_a_force_that_never_settles_aborts_with_what_was_waited_for(table, monkeypatch):
     monkeypatch.setattr(SafetyLimits, 'contact_timeout_s', 0.5)
-    monkeypatch.setattr(SimulatedArmParams, 'admittance_m_s_n', 1e-4)
+    monkeypatch.setattr(TableArmParams, 'admittance_m_s_n', 1e-4)
     outcome = table.explore(ExplorationRequest('linear_slide', force_n=3.0))
     assert outcome.error is ExplorationError.MOTION_FAILED
     assert outcome.message.startswith('waited 0.5 s for the force to settle at 3 N; the force is')
@@ -256,7 +256,7 @@ def test_whatever_ends_a_slide_ends_it_within_100_ms_and_the_next_exploration_wo
 def test_a_wall_in_the_path_ends_the_slide_and_the_finger_goes_back_before_it_is_lifted(
     make_table, speed_m_s, force_mode
 ):
-    table = make_table(SimulatedArmParams(force_mode=force_mode), shape=SurfaceShape(wall_m=0.02))
+    table = make_table(TableArmParams(force_mode=force_mode), shape=Shape(wall_m=0.02))
     held = []
     table.at_each_step = lambda: held.append(table.arm.state().force_size_n)
     outcome = table.explore(ExplorationRequest('linear_slide', speed_m_s=speed_m_s, force_n=1.0, distance_m=0.06))
@@ -270,7 +270,7 @@ def test_a_wall_in_the_path_ends_the_slide_and_the_finger_goes_back_before_it_is
 
 def test_a_force_that_comes_late_at_a_wall_is_not_taken_for_something_above_the_finger(make_table):
     """The force of the wall still grows in the readings while the finger is on its way back and up already."""
-    table = make_table(SimulatedArmParams(force_mode=False), shape=SurfaceShape(wall_m=0.02))
+    table = make_table(TableArmParams(force_mode=False), shape=Shape(wall_m=0.02))
     state, late = table.arm.state, deque(maxlen=5)
 
     def state_with_late_force():

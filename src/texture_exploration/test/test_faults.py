@@ -18,7 +18,6 @@ from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.catalogue import ARMS
 from texture_exploration.arms.in_hand import InHandArm, InHandParams
 from texture_exploration.arms.rails import RailsArm, RailsParams
-from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
 from texture_exploration.arms.ur import UrArm, UrArmParams
 from texture_exploration.explorer import Explorer
 from texture_exploration.safety import SafetyLimits
@@ -70,12 +69,6 @@ def hand(folder):
         yield bus, InHandArm(InHandParams(hand='dynamixel', device=str(bus.port.link), grip_timeout_s=20.0)), RUB
 
 
-@contextmanager
-def simulated(_folder):
-    arm = SimulatedArm(SimulatedArmParams(start_height_m=HEIGHT_M))
-    yield arm, arm, SLIDE
-
-
 def nothing(_device):
     pass
 
@@ -116,7 +109,6 @@ FAULTS = {
     'a hand loses its cable': (
         hand, 'dynamixel_sdk', EmulatedDynamixelBus.unplug, EmulatedDynamixelBus.plug, 'cannot be reached', 0.1,
     ),
-    'simulated stalls': (simulated, 'numpy', SimulatedArm.jam, SimulatedArm.connect, STALLED, 0.5),
     'ur stalls': (
         patient_ur, 'rtde_control', lambda c: c.ask('emulate speed 0.15'), lambda c: c.ask('emulate speed 1'),
         STALLED, 0.5,
@@ -135,7 +127,7 @@ FAULTS = {
 
 def test_every_arm_has_a_test_of_a_finger_that_stalls():
     tested = {name.split()[0] for name, (*_, expected, _soon_s) in FAULTS.items() if expected is STALLED}
-    assert tested | {'ros_controllers'} == set(ARMS)  # that one in test_ros_controllers, in its own time
+    assert tested | {'ros_controllers', 'simulated'} == set(ARMS)  # those in virtual time
 
 
 def explored(explorer, request, on_slide=None):

@@ -5,23 +5,23 @@
 from dataclasses import replace
 
 import pytest
+from table_arm import Shape, TableArm, TableArmParams
 
 from texture_core.types import ExplorationRequest, Phase
-from texture_exploration.arms.arm import ArmCommand, ArmState, ForceReading
-from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams, SurfaceShape
+from texture_exploration.arms.arm import ArmCommand, ArmState
 from texture_exploration.guards import ForceWatch
 from texture_exploration.safety import SafetyLimits
 from texture_exploration.touch import TouchParams
 
 REQUEST = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.06)
-ARM = SimulatedArmParams(force_mode=False, start_height_m=0.002, max_stiffness_n_m=20000.0)
+ARM = TableArmParams(force_mode=False, start_height_m=0.002, max_stiffness_n_m=20000.0)
 TILT = 0.005  # a steeper slope is no success with one gain for the stiffest contact
 
 
 def explore(make_table, arm, happens, phase, *, request=REQUEST, tilt_rad=0.0):
     """Explore while something happens in a phase; return the table, the outcome, and when it was."""
     touch = TouchParams(approach_stiffness_n_m=arm.max_stiffness_n_m)
-    table = make_table(arm, touch, shape=SurfaceShape(tilt_rad=tilt_rad))
+    table = make_table(arm, touch, shape=Shape(tilt_rad=tilt_rad))
     happened = []
     table.when[phase] = lambda: (happened.append(table.now_ns), happens(table.arm))
     return table, table.explore(request), happened[0]
@@ -37,7 +37,7 @@ def lifted_ns(table):
 @pytest.mark.parametrize('phase', [Phase.APPROACH, Phase.CONTACT, Phase.SLIDE])
 def test_a_frozen_force_is_noticed_within_100_ms_and_the_finger_is_lifted(make_table, phase, stiffness, tilt_rad):
     arm = replace(ARM, stiffness_n_m=stiffness, max_stiffness_n_m=stiffness)
-    freeze = SimulatedArm.freeze_force
+    freeze = TableArm.freeze_force
     table, outcome, frozen_ns = explore(make_table, arm, freeze, phase, tilt_rad=tilt_rad)
     assert not outcome.success
     assert outcome.message.startswith('the measured force is frozen: it has been')
@@ -50,7 +50,7 @@ def test_a_frozen_force_is_noticed_within_100_ms_and_the_finger_is_lifted(make_t
 @pytest.mark.parametrize('stiffness', [200.0, 2000.0, 20000.0])
 def test_a_force_that_freezes_far_from_the_wanted_one_is_noticed_without_noise_too(make_table, stiffness, noise_n):
     arm = replace(ARM, stiffness_n_m=stiffness, max_stiffness_n_m=stiffness, force_noise_n=noise_n)
-    table, outcome, frozen_ns = explore(make_table, arm, SimulatedArm.freeze_force, Phase.CONTACT)
+    table, outcome, frozen_ns = explore(make_table, arm, TableArm.freeze_force, Phase.CONTACT)
     assert outcome.message.startswith('the measured force is frozen')
     assert (lifted_ns(table) - frozen_ns) * 1e-9 <= 0.25  # it stands at first, which proves nothing without noise
     assert table.largest_n < 6.0
@@ -61,7 +61,7 @@ def test_a_force_that_freezes_far_from_the_wanted_one_is_noticed_without_noise_t
 @pytest.mark.parametrize('stiffness', [200.0, 2000.0, 20000.0])
 def test_an_arm_without_noise_whose_force_stays_the_same_is_believed(make_table, force_mode, tilt_rad, stiffness):
     arm = replace(ARM, stiffness_n_m=stiffness, max_stiffness_n_m=stiffness, force_mode=force_mode, force_noise_n=0.0)
-    table = make_table(arm, TouchParams(approach_stiffness_n_m=20000.0), shape=SurfaceShape(tilt_rad=tilt_rad))
+    table = make_table(arm, TouchParams(approach_stiffness_n_m=20000.0), shape=Shape(tilt_rad=tilt_rad))
     outcome = table.explore(REQUEST)
     assert outcome.success, outcome.message
 
@@ -97,7 +97,7 @@ def test_a_force_of_the_wrong_sign_is_limited_too():
 
 
 def test_a_pause_of_the_arm_is_no_frozen_reading():
-    watch = ForceWatch(SafetyLimits(), ForceReading.NOISY, 1.0)
+    watch = ForceWatch(SafetyLimits(), True, 1.0)
     state = ArmState(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.5)
     assert not any(watch.frozen(state, ArmCommand()) for _ in range(100))
     assert watch.frozen(replace(state, time_ns=400_000_000), ArmCommand()) == ''  # one state after a pause
@@ -106,7 +106,7 @@ def test_a_pause_of_the_arm_is_no_frozen_reading():
 @pytest.mark.parametrize(('late_s', 'is_frozen'), [(0.03, False), (0.2, True)])
 def test_a_force_that_the_arm_held_may_stay_the_same_until_the_lift_takes_effect(late_s, is_frozen):
     """A hand in current control reports exactly the force that it holds; one count of its encoder moves the height."""
-    watch = ForceWatch(SafetyLimits(), ForceReading.CONTROLLED, 1.0)
+    watch = ForceWatch(SafetyLimits(), False, 1.0)
     for step in range(50):
         free = ArmState(step * 10_000_000, (0.0, 0.0, 0.01), (0.0, 0.0, 0.0), 0.0)
         watch.note(Phase.APPROACH, free, ArmCommand(normal_m_s=-0.01))
@@ -131,7 +131,7 @@ def test_a_force_that_the_arm_held_may_stay_the_same_until_the_lift_takes_effect
     ],
 )
 def test_only_what_was_measured_above_the_surface_counts_as_free_air(lift, drifted):
-    watch = ForceWatch(SafetyLimits(), ForceReading.NOISY, wanted_n=1.0)
+    watch = ForceWatch(SafetyLimits(), True, wanted_n=1.0)
     for step in range(40):
         watch.note(Phase.APPROACH, ArmState(step * 10_000_000, (0.0, 0.0, 0.01), (0.0, 0.0, 0.0), 0.0), ArmCommand())
     for height_m, force_n in lift:

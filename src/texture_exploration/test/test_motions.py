@@ -5,15 +5,14 @@
 import math
 from itertools import pairwise
 
-import numpy as np
 import pytest
+from table_arm import TableArm, TableArmParams
 
 from texture_core.errors import ExplorationError, MotionRefused
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.arm import ArmState
-from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
 from texture_exploration.motions import DEFAULTS, MOTIONS
-from texture_exploration.paths import CircularPath, PathFollower, StraightPath, StrokeEnds, ramp_s, ramps_m, smooth
+from texture_exploration.paths import CircularPath, PathFollower, StraightPath, ramp_s, ramps_m, smooth
 from texture_exploration.safety import SafetyLimits
 from texture_exploration.touch import TouchParams
 
@@ -128,8 +127,6 @@ REFUSED = [
     ('circular', {'radius_m': 0.005, 'speed_m_s': 0.2}, INVALID, 'at most 0.158 m/s'),
     ('circular', {'radius_m': 0.1}, OUTSIDE, 'at most 0.05 m'),
     ('in_hand_sliding', {'speed_m_s': 0.1, 'distance_m': 0.01}, INVALID, 'of a stroke, is 0.01; allowed is 0.0'),
-    # A random stroke may be half as long, so the shortest that turns is twice that.
-    ('in_hand_random', {'speed_m_s': 0.05, 'distance_m': 0.02}, INVALID, 'of a stroke, is 0.02; allowed is 0.0'),
 ]
 
 
@@ -143,11 +140,6 @@ def test_what_cannot_be_done_is_refused_with_what_can_and_names_the_field(motion
     assert refused.value.field in numbers
 
 
-def test_a_whole_stroke_turns_where_a_random_one_is_too_short():
-    request = ExplorationRequest('in_hand_sliding', speed_m_s=0.05, distance_m=0.02)
-    MOTIONS['in_hand_sliding'](request, (0.0, 0.0, 0.01), TouchParams(), LIMITS)
-
-
 def test_a_default_beyond_a_limit_is_the_limit():
     hard = SafetyLimits(min_force_n=3.0, max_force_n=8.0, max_speed_m_s=0.02)
     request = hard.complete(ExplorationRequest('linear_slide'), {'speed_m_s': 0.05, 'force_n': 1.0, 'distance_m': 0.1})
@@ -158,25 +150,26 @@ def test_a_default_beyond_a_limit_is_the_limit():
 # Circles.
 
 
-class LateArm(SimulatedArm):
+class LateArm(TableArm):
     """An arm that takes two more steps of 5 ms to follow."""
 
-    def __init__(self, *args, **kwargs):
-        super().__init__(*args, **kwargs)
-        self._coming = []
+    def __init__(self, *args):
+        super().__init__(*args)
+        self._commands = []
 
     def step(self, dt_s):
-        self._coming.append(self._last_command)
+        self._commands.append(self._last_command)
         newest = self._last_command
-        self._last_command = self._coming.pop(0) if len(self._coming) > 2 else self._coming[0]
+        self._last_command = self._commands.pop(0) if len(self._commands) > 2 else self._commands[0]
         super().step(dt_s)
         self._last_command = newest
 
 
-@pytest.mark.parametrize('arm_class', [SimulatedArm, LateArm])
+@pytest.mark.parametrize('arm_class', [TableArm, LateArm])
 @pytest.mark.parametrize('speed', [0.05, 0.1, 0.15])
 def test_the_radius_is_kept_within_a_millimetre(table, speed, arm_class):
-    table.arm = arm_class(SimulatedArmParams(), clock=lambda: table.now_ns, own_thread=False)
+    table.arm = arm_class(TableArmParams(), lambda: table.now_ns)
+    table.arm.connect()
     assert table.explore(ExplorationRequest('circular', speed_m_s=speed, turns=3.0)).success
     radii = [math.hypot(x, y) for _, (x, y, _) in sliding(table)]
     assert max(abs(radius - 0.02) for radius in radii) < 0.001
@@ -312,7 +305,7 @@ def guaranteed_speeds(table, request):
 
 @pytest.mark.parametrize('lag_s', [0.008, 0.02, 0.05])
 def test_after_a_turn_a_late_arm_is_steady_only_when_it_has_turned(make_table, lag_s):
-    table = make_table(SimulatedArmParams(force_mode=False, loop_delay_s=lag_s, start_height_m=0.002))
+    table = make_table(TableArmParams(force_mode=False, loop_delay_s=lag_s, start_height_m=0.002))
     speeds = guaranteed_speeds(table, RUB)
     assert len(speeds) > 100
     begun_within = abs(speeds[0] / 0.02 - 1)
@@ -325,27 +318,6 @@ def test_no_turn_exceeds_the_acceleration(table):
     velocities = [(s.stamp_ns, p) for s, p in sliding(table)]
     speeds = [(b[1][0] - a[1][0]) / ((b[0] - a[0]) * 1e-9) for a, b in pairwise(velocities)]
     assert max(abs(b - a) / 0.02 for a, b in pairwise(speeds)) < 1.1
-
-
-def test_random_strokes_stay_within_the_stroke_and_are_at_least_half_as_long():
-    for seed in range(20):
-        ends = StrokeEnds(0.02, 0.01, np.random.default_rng(seed))
-        places = [0.0]
-        for number in range(20):
-            places.append(ends.draw(number % 2 == 0, places[-1]))
-        assert min(places) >= 0.0 and max(places) <= 0.02
-        lengths = [abs(b - a) for a, b in pairwise(places)]
-        assert min(lengths) >= 0.01 - 1e-12
-        assert np.ptp(lengths) > 0.001
-
-
-def test_a_finger_rubs_at_random_places_and_turns_elsewhere_each_time(table):
-    assert table.explore(ExplorationRequest('in_hand_random', duration_s=10.0)).success
-    along = [place[0] for place in table.places]
-    assert min(along) > -0.0005 and max(along) < 0.0205
-    along = [place[0] for _, place in sliding(table)]
-    turns = [b for a, b, c in zip(along, along[1:], along[2:], strict=False) if (b - a) * (c - b) < 0]
-    assert len({round(place, 4) for place in turns}) > 4  # without chance it turns at two; chance may repeat one
 
 
 # --------------------

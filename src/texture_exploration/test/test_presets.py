@@ -42,7 +42,6 @@ PUBLISHED = {
     'ets-roughness': {'speed_m_s': {0.15}, 'force_n': {2.5}, 'distance_m': {0.105}, 'repeats': 200},
     'jamali': {'force_n': {1.0}, 'repeats': 50},
     'kaboli': {'duration_s': {2.0 + 2 * LATE_S}, 'repeats': 10},
-    'kaboli-random': {'distance_m': {0.03}, 'repeats': 10},
     'hu-cross': {'speed_m_s': {0.0255}, 'force_n': {1.5}, 'direction_rad': {0}, 'repeats': 60},
     'hu': {
         'speed_m_s': {0.0255},
@@ -75,7 +74,7 @@ MISTAKES = [
     ({'sped_m_s': 1.0}, InvalidParameter, "preset 'mine': no key 'sped_m_s'; did you mean 'speed_m_s'"),
     ({'force_n': 'hard'}, InvalidParameter, "'force_n' is 'hard'; a number is needed"),
     *(({'force_n': one}, InvalidParameter, r"'force_n' is .*; at most 1e\+06 is allowed") for one in HUGE),
-    ({'vary': {'force_n': 2.0}}, InvalidParameter, 'a list of numbers is needed'),
+    ({'vary': {'force_n': 2.0}}, InvalidParameter, 'each a list of numbers'),
     ({'slide_s': 1.0}, InvalidParameter, "'slide_s' needs 'speed_m_s'"),
     ({'repeats': 0}, InvalidParameter, "'repeats' is 0"),
 ]

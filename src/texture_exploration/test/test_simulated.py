@@ -7,7 +7,7 @@ import pytest
 
 from texture_core.types import FingerReceiver
 from texture_exploration.arms.arm import ArmCommand
-from texture_exploration.arms.simulated import HOLDS_S, DelayedVelocity, SimulatedArm, SimulatedArmParams
+from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
 
 
 class Clock:
@@ -59,36 +59,6 @@ def test_above_the_surface_force_control_comes_down(clock):
     assert arm.state().force_n == pytest.approx(1.0, rel=1e-3)
 
 
-def test_an_arm_that_slept_moves_no_longer_than_a_command_holds(clock):
-    arm = make(clock, stiffness_n_m=2000.0, start_height_m=0.0)
-    clock.now_ns += 500_000_000
-    arm.command(ArmCommand(normal_m_s=-0.02))  # of one who sees an old state
-    arm.step(0.5)
-    assert arm.state().force_n == pytest.approx(2000.0 * 0.02 * 0.1)
-
-
-def test_an_arm_without_force_mode_that_slept_goes_no_further_than_a_velocity_holds(clock):
-    arm = make(clock, force_mode=False, stiffness_n_m=20000.0, max_stiffness_n_m=20000.0, start_height_m=0.0005)
-    pressing = ArmCommand(tangential_m_s=(0.05, 0.0), force_n=1.0)
-    run(arm, clock, pressing, 2.0)
-    x_m, force_n = arm.state().position[0], arm.state().force_n
-    for _ in range(3):
-        clock.now_ns += 300_000_000
-        arm.command(pressing)
-        arm.step(0.3)
-    run(arm, clock, pressing, 0.02)
-    assert arm.state().force_n == pytest.approx(force_n, abs=0.05)
-    assert arm.state().position[0] - x_m == pytest.approx(0.05 * (3 * HOLDS_S + 0.02), abs=1e-6)
-
-
-def test_a_velocity_comes_into_effect_late_and_does_not_hold_for_ever():
-    late = DelayedVelocity(0.008, 0)
-    late.ask(0, (0.1, 0.0, -0.1))
-    assert late.moved_m(10_000_000) == pytest.approx((0.0002, 0.0, -0.0002))
-    assert late.moved_m(1_000_000_000) == pytest.approx((0.1 * (HOLDS_S - 0.002), 0.0, -0.1 * (HOLDS_S - 0.002)))
-    assert late.moved_m(2_000_000_000) == (0.0, 0.0, 0.0)
-
-
 def test_a_command_moves_the_arm_no_longer_than_it_holds_however_late_the_step(clock):
     arm = make(clock)
     arm.command(ArmCommand(normal_m_s=0.02))
@@ -96,23 +66,6 @@ def test_a_command_moves_the_arm_no_longer_than_it_holds_however_late_the_step(c
     arm.step(1.0)
     assert arm.state().position[2] == pytest.approx(0.01 + 0.02 * 0.1)
     assert arm.state().velocity == (0.0, 0.0, 0.0)
-
-
-def test_a_frozen_arm_grows_old_until_it_is_connected_again(clock):
-    arm = make(clock)
-    arm.freeze()
-    run(arm, clock, ArmCommand(normal_m_s=0.1), 0.2)
-    assert arm.state().time_ns == 0
-    arm.connect()
-    assert arm.state().time_ns == clock.now_ns
-
-
-def test_a_failed_arm_stands_still_and_says_why(clock):
-    arm = make(clock)
-    arm.fail('protective stop')
-    run(arm, clock, ArmCommand(normal_m_s=0.1), 0.1)
-    assert arm.state().fault == 'protective stop'
-    assert arm.state().position == (0.0, 0.0, 0.01)
 
 
 def test_the_emulator_is_told_where_the_finger_is(clock, tmp_path):

@@ -8,22 +8,26 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from table_arm import TableArmParams
 
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration import force_control, guards, lift_first, safety, stages, touch, watches
 from texture_exploration.arms.arm import STANDSTILL
-from texture_exploration.arms.simulated import SimulatedArmParams
 from texture_exploration.explorer import PERIOD_S
-from texture_exploration.motion import STATES, limit_table, state_table
 from texture_exploration.motions import MOTIONS
 
 PAGE = Path(__file__).parents[3] / 'docs' / 'motion.md'
 
 
-def test_the_page_shows_the_states_and_the_limits_of_the_code():
-    page = PAGE.read_text(encoding='utf-8')
-    assert state_table() in page
-    assert limit_table() in page
+def table_below(heading):
+    """Return the rows of a table of the page by their first cell."""
+    lines = PAGE.read_text(encoding='utf-8').partition(heading)[2].splitlines()[2:]
+    rows = [[cell.strip(' `') for cell in line.strip('|').split('|')] for line in lines[: lines.index('')]]
+    return {name: cells for name, *cells in rows}
+
+
+STATES = table_below('| state | commands')  # commands, end, and where an error leads
+LIMITS = table_below('| limit | quantity')  # quantity, value, who checks, how fast, what follows
 
 
 def kind(command):
@@ -46,7 +50,7 @@ HAPPENS = {
 
 @pytest.mark.parametrize('name', HAPPENS)
 def test_each_state_commands_and_leads_to_what_its_row_says(make_table, monkeypatch, name):
-    table, seen, entered = make_table(SimulatedArmParams(start_height_m=0.003)), [], []
+    table, seen, entered = make_table(TableArmParams(start_height_m=0.003)), [], []
     phase, happens = HAPPENS[name]
     if phase:
         table.when[phase] = lambda: happens(table)
@@ -65,19 +69,51 @@ def test_each_state_commands_and_leads_to_what_its_row_says(make_table, monkeypa
     )
     table.explore(ExplorationRequest('linear_slide', distance_m=0.02))
     assert {state for state, _ in seen} >= {lift_first.Rise, lift_first.CalmDown, stages.LiftStage}
-    assert [(state.__name__, said) for state, said in seen if said not in state.commands] == []
-    assert {state for state, _ in seen} <= set(STATES)
-    order = [state for state in STATES if state is not lift_first.GoBack]
-    for before, after in pairwise(entered):
-        assert after is order[order.index(before) + 1] or after.__name__.removesuffix('Stage') in before.on_error
+    assert [(state.__name__, said) for state, said in seen if said not in STATES[state.__name__][0].split(', ')] == []
+    order = [name for name in STATES if name != 'GoBack']
+    for before, after in pairwise(state.__name__ for state in entered):
+        follows = order[order.index(before) + 1 :][:1]
+        assert after in follows or after.removesuffix('Stage') in STATES[before][2]
 
 
-def test_every_limit_of_the_table_is_a_name_of_the_code():
-    known = {name for module in (force_control, lift_first, safety, touch, watches) for name in vars(module)}
-    for given in (safety.SafetyLimits, safety.CommandLimits, guards.SignalWatchParams, touch.TouchParams):
-        known |= {*vars(given), *given.__dataclass_fields__}
-    for name in re.findall(r'^\| `(.*?)`', limit_table(), re.MULTILINE):
-        assert {*name.replace(', …', '').replace(' to ', ', ').split(', ')} <= known
+def values():
+    """Return the value of each limit as the page writes it."""
+    limits, touching, commands = safety.SafetyLimits(), touch.TouchParams(), safety.CommandLimits()
+    low_m, high_m, wall_n = limits.z_low_m, limits.z_high_m, touch.WALL_SHARE * limits.force_limit_n
+    stages_s = limits.approach_timeout_s, limits.contact_timeout_s, limits.slide_overtime_s, limits.lift_timeout_s
+    speeds = commands.command_speed_m_s, commands.command_normal_m_s, commands.command_force_n
+    return {
+        'MOST_FORCE_N, MOST_M': f'finite, {safety.MOST_FORCE_N / 1e3:g} kN, {safety.MOST_M:g} m',
+        'force_limit_n': f'{limits.force_limit_n:g} N',
+        'WALL_SHARE': f'{touch.WALL_SHARE:g} × force_limit_n, {wall_n:g} N',
+        'friction_limit': f'{limits.friction_limit:g} × normal + {limits.tangential_floor_n:g} N',
+        'x_low_m to z_high_m': f'±{limits.x_high_m:g} m; {low_m:g} to {high_m:g} m',
+        'surface_tolerance_m': f'{1e3 * limits.surface_tolerance_m:g} mm',
+        'state_timeout_s': f'{limits.state_timeout_s:g} s',
+        'signal_timeout_s': f'{guards.SignalWatchParams().signal_timeout_s:g} s',
+        'frozen_force_s': f'{limits.frozen_force_s:g} s',
+        'force_drift_fraction': f'{100 * limits.force_drift_fraction:g} %',
+        'OVERSHOOT': f'{100 * watches.OVERSHOOT:g} % above the wanted',
+        'HARD, LATE_S': f'{force_control.HARD:g} impacts; {1e3 * force_control.LATE_S:g} ms',
+        'peak_force_fraction': f'{100 * touching.peak_force_fraction:g} % above the wanted',
+        'peak_speed_fraction': f'{100 * touching.peak_speed_fraction:g} % above the wanted',
+        'lost_contact_s': f'{touching.lost_contact_s:g} s',
+        'stall_s': f'{100 * touching.stall_speed_fraction:g} % in {touching.stall_s:g} s',
+        'MOST_FORCE_SHARE': f'{100 * lift_first.MOST_FORCE_SHARE:g} % of force_limit_n',
+        'approach_travel_m': f'{1e3 * touching.approach_travel_m:g} mm',
+        'approach_timeout_s, …': f'{", ".join(f"{one:g}" for one in stages_s)} s',
+        'command_speed_m_s, …': f'{speeds[0]:g} m/s, {speeds[1]:g} m/s, {speeds[2]:g} N',
+    }
+
+
+def test_the_page_shows_the_states_and_the_limits_of_the_code():
+    assert set(STATES) == {stage.__name__ for stage in stages.Stage.__subclasses__()}
+    assert {name: cells[1].replace('−', '-') for name, cells in LIMITS.items()} == values()
+    assert LIMITS['HARD, LATE_S'][3] == f'delay + {force_control.LATE_S + 2 * force_control.HALF_S:g} s'
+    steps = {how_fast for _, _, _, how_fast, _ in LIMITS.values() if how_fast.startswith('each step')}
+    assert steps == {f'each step, {1e3 * PERIOD_S:g} ms'}
+    known = {name for module in (guards, stages, lift_first, watches, force_control) for name in vars(module)}
+    assert {who for cells in LIMITS.values() for who in re.findall(r'[A-Z]\w+', cells[2])} <= known | {'Exploration'}
 
 
 def test_the_sentences_of_the_pages_hold_the_limits_of_the_code():
@@ -114,7 +150,3 @@ def test_the_sentences_of_the_pages_hold_the_limits_of_the_code():
         page = PAGE.with_name(name).read_text()
         assert [sentence for sentence in expected if sentence not in page] == []
         assert {*map(float, re.findall(r'above (\d+) N', page))} == {limits.force_limit_n}
-
-
-def test_each_step_of_the_table_is_the_period_of_the_explorer():
-    assert f'each step, {1e3 * PERIOD_S:g} ms' in limit_table()

@@ -5,10 +5,10 @@
 from dataclasses import replace
 
 import pytest
+from table_arm import TableArmParams
 
 from texture_core.errors import MotionRefused
 from texture_core.types import ExplorationRequest
-from texture_exploration.arms.simulated import SimulatedArmParams
 from texture_exploration.touch import REACTION_S, TouchParams
 
 TOUCH = TouchParams(approach_speed_m_s=0.1, approach_stiffness_n_m=2000.0)
@@ -50,7 +50,7 @@ def test_an_approach_that_is_too_slow_says_so(table):
 @pytest.mark.parametrize(('delay_s', 'allowed'), [(0.0, '0.125'), (0.02, '0.0514'), (0.05, '0.0273'), (0.1, '0.0153')])
 def test_a_slide_too_fast_for_a_wall_as_declared_is_refused_before_anything_moves(make_table, delay_s, allowed):
     """Force limit and 3.5 times as much more: stiffness × speed × (delay + 14 ms)."""
-    arm = SimulatedArmParams(force_mode=False, loop_delay_s=delay_s, max_stiffness_n_m=20000.0, max_impact_n=1.0)
+    arm = TableArmParams(force_mode=False, loop_delay_s=delay_s, max_stiffness_n_m=20000.0, max_impact_n=1.0)
     table = make_table(arm, TouchParams(approach_stiffness_n_m=20000.0))
     with pytest.raises(
         MotionRefused, match=rf'a wall of 20000 N/m .* 45 N, .* allowed is at most {allowed} m/s'

@@ -12,7 +12,6 @@ import importlib.util
 import os
 import signal
 import socket
-import struct
 import subprocess
 import sys
 import tempfile
@@ -167,7 +166,7 @@ def commands():
 
 
 @contextlib.contextmanager
-def listener(ip, port=30004, serve=None):
+def listener(ip, port, serve=None):
     """Someone who takes connections and, by default, never answers."""
     with socket.create_server((ip, port)) as server:
         if serve is not None:
@@ -175,29 +174,7 @@ def listener(ip, port=30004, serve=None):
         yield
 
 
-def answer_version(server):
-    """Answer what the probe asks of either port, as version 5.12 on which no program runs, and nothing else."""
-    kept = []
-    with contextlib.suppress(OSError):
-        while True:
-            connection, _ = server.accept()
-            kept.append(connection)
-            threading.Thread(target=_answer_version, args=(connection,), daemon=True).start()
-
-
-def _answer_version(connection):
-    with contextlib.suppress(OSError):
-        while data := connection.recv(3):
-            size, kind = struct.unpack('>HB', data)
-            if size > 3:
-                connection.recv(size - 3)
-            if kind == 86:
-                connection.sendall(struct.pack('>HBB', 4, 86, 1))
-            elif kind == 118:
-                connection.sendall(struct.pack('>HB4I', 19, 118, 5, 12, 0, 0))
-
-
-READY = ['Robotmode: RUNNING', 'true', 'Safetymode: NORMAL', 'Program running: false', 'STOPPED']
+READY = ['URSoftware 5.12.0', 'Robotmode: RUNNING', 'true', 'Safetymode: NORMAL', 'Program running: false', 'STOPPED']
 
 
 def dashboard(answers):
@@ -354,13 +331,13 @@ def test_when_the_parent_is_killed_the_arm_stops_and_the_worker_ends(emulator, r
 
 
 def test_nobody_there_is_said_in_a_sentence():
-    with pytest.raises(DeviceError, match=r"nothing listens on 127\.0\.0\.52:30004; .* 'ip'"):
+    with pytest.raises(DeviceError, match=r"nothing listens on 127\.0\.0\.52:29999; .* 'ip'"):
         UrArm(UrArmParams(ip='127.0.0.52')).connect()
 
 
 def test_a_controller_that_takes_connections_but_never_answers_blocks_nobody(record_property):
     arm = UrArm(UrArmParams(ip='127.0.0.53'))
-    with listener('127.0.0.53'), Ticker() as ticker:
+    with listener('127.0.0.53', 29999), Ticker() as ticker:
         begin_s = time.monotonic()
         with pytest.raises(DeviceError, match=r'does not answer as a UR controller within 1\.5 s'):
             arm.connect()
@@ -372,7 +349,7 @@ def test_a_controller_that_takes_connections_but_never_answers_blocks_nobody(rec
 
 def test_a_controller_that_hangs_in_the_handshake_blocks_nobody_and_leaves_no_process(record_property):
     arm = UrArm(UrArmParams(ip='127.0.0.54', connect_timeout_s=1.0))
-    rtde, board = listener(arm._params.ip, serve=answer_version), listener(arm._params.ip, 29999, dashboard(READY))
+    rtde, board = listener(arm._params.ip, 30004), listener(arm._params.ip, 29999, dashboard(READY))
     with rtde, board, Ticker() as ticker:
         begin_s = time.monotonic()
         with pytest.raises(DeviceError, match=r'stopped answering|did not let the arm be ready within 1 s'):
@@ -392,8 +369,8 @@ def test_a_controller_that_hangs_in_the_handshake_blocks_nobody_and_leaves_no_pr
 )
 def test_an_arm_that_is_not_ready_is_refused_with_what_to_do(answers, sentence):
     ip = f'127.0.1.{len(answers)}'  # the server of the case before may still hold its port
-    rtde, board = listener(ip, serve=answer_version), listener(ip, 29999, dashboard(answers))
-    with rtde, board, pytest.raises(DeviceError, match=sentence):
+    board = listener(ip, 29999, dashboard(['URSoftware 5.12.0', *answers]))
+    with board, pytest.raises(DeviceError, match=sentence):
         UrArm(UrArmParams(ip=ip)).connect()
 
 
@@ -520,8 +497,6 @@ def test_slow_acknowledgements_of_stops_and_zeroing_do_not_trip_the_watchdog(lat
     assert arm.state().fault == ''
     counts = arm.counts
     assert (counts['refused'], counts['zeroed'] >= 1) == (0, True)
-    assert counts['slow_acknowledgements'] >= 3  # a stop that follows closely on another is not acknowledged by itself
-    assert 300 <= counts['slowest_acknowledgement_ms'] < 1000
 
 
 def test_after_a_slow_acknowledgement_the_watchdog_guards_the_moving_arm_as_before(late):

@@ -144,7 +144,7 @@ class Exploration:
         self._clock = clock
         self._on_state = on_state
         self._signal_fault = signal_fault
-        self._force_watch = ForceWatch(limits, arm.force_reading, motion.force_n)
+        self._force_watch = ForceWatch(limits, arm.noisy_force, motion.force_n)
         self._guard = ForceGuard(limits)
         self._commanded = ArmCommand()
         self._arm_state: ArmState | None = None  # the newest with plausible numbers
@@ -276,7 +276,6 @@ class Exploration:
                 ExplorationError.WORKSPACE,
                 f'the finger left the workspace: {outside}' if outside and self._entered else '',
             ),
-            (ExplorationError.ARM_FAULT, self._arm.doubt()),
             (ExplorationError.NO_SIGNAL, self._signal_fault(self._listening)),
             (ExplorationError.TIMEOUT, self._overdue(now_ns)),
         )

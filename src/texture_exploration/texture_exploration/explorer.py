@@ -26,8 +26,10 @@ from texture_exploration.touch import TouchParams
 
 PERIOD_S = 0.01
 CLOSING_S = 10.0  # longer than any motion needs to lift
-
-
+NO_CONTROL = (
+    'the explorer has no control of the arm; run `texture activate`, or `ros2 lifecycle set` with configure and '
+    'activate'
+)
 GENTLE_N = 1.0  # the force of a finger found in contact is unknown: it rises as before a gentle slide
 
 
@@ -63,7 +65,7 @@ class Explorer:
         self.lifted = False  # known to be free of the surface
         self._current: Exploration | None = None
         self._thread: threading.Thread | None = None
-        self._closed = self._released = False
+        self._refuses = ''  # in a sentence, why requests are refused
         self._lift_ends = threading.Event()
         self._touches = SurfaceTouches()
 
@@ -75,7 +77,7 @@ class Explorer:
         self._lift_first, self.lifted, self._zero_n = True, False, None
         self.arm.close()
         self.arm.connect()
-        self._released = False
+        self._refuses = ''
         # After a fault the finger may hang anywhere; the first place is the one that the operator chose.
         self._home = self._home or self.arm.state().position
         return self._home
@@ -91,10 +93,7 @@ class Explorer:
         Explorations begin where the finger is at that `connect`: another controller may have moved it meanwhile, and
         the way back to the old place may be blocked.
         """
-        self._lift_ends.set()
-        with self._lock:
-            self._released = True
-        self._end_motion('the explorer released the arm')
+        self._end_motion('the explorer released the arm', NO_CONTROL)
         if not self.arm.keeps_start:
             self._home = None
 
@@ -261,20 +260,18 @@ class Explorer:
 
     def close(self) -> None:
         """Abort, wait until the finger is lifted, release the arm."""
+        self._end_motion('the explorer was shut down', 'the explorer is shutting down')
+
+    def _end_motion(self, reason: str, refuses: str) -> None:
         self._lift_ends.set()
         with self._lock:
-            self._closed = True
-        self._end_motion('the explorer was shut down')
-
-    def _end_motion(self, reason: str) -> None:
+            self._refuses = refuses
         self.stop(reason)
         if self._thread is not None:
             self._thread.join(CLOSING_S)
         self.arm.close()
 
     def _prepare(self, exploration_id: str, request: ExplorationRequest) -> Exploration:
-        if self._closed:
-            raise MotionRefused('the explorer is shutting down', ExplorationError.NOT_ACTIVE)
         self._check_idle()
         plan = find(MOTIONS, request.motion, 'motion')
         start = self.patch.start(request, self._ready(), self.limits)
@@ -313,12 +310,8 @@ class Explorer:
             )
 
     def _check_idle(self) -> None:
-        if self._released:
-            raise MotionRefused(
-                'the explorer has no control of the arm; run `texture activate`, or '
-                '`ros2 lifecycle set` with configure and activate',
-                ExplorationError.NOT_ACTIVE,
-            )
+        if self._refuses:
+            raise MotionRefused(self._refuses, ExplorationError.NOT_ACTIVE)
         if self.current is not None:
             raise MotionRefused(
                 f"exploration '{self.current.exploration_id}' is still running; wait for its end or stop it",

@@ -19,13 +19,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from statistics import fmean
-from typing import NamedTuple
 
 import numpy as np
 
 from texture_core.config import param
 from texture_core.errors import InvalidParameter
 from texture_core.types import Array
+from texture_exploration.arms.arm import ArmCommand, ArmState, Vector
 
 # --------------------
 # Stability limit of the force control, predicted from the sampled loop.
@@ -123,11 +123,7 @@ class ForceLoopParams:
     """Parameters of the force control of an arm without a force mode."""
 
     loop_delay_s: float = param(
-        0.008,
-        'Largest delay from a force to the motion that responds; larger: lower gain.',
-        unit='s',
-        low=0.0,
-        high=0.1,
+        0.02, 'Largest delay from a force to the motion that responds; larger: lower gain.', unit='s', low=0.0, high=0.1
     )
     max_stiffness_n_m: float = param(
         5000.0, 'Stiffest contact; larger: slower approach, lower gain.', unit='N/m', low=100.0, high=200000.0
@@ -189,13 +185,6 @@ ROSE_FRACTION = 0.5  # of the force that counts as touching, by which the mean o
 HARD = 2.0  # impacts as declared, beyond which the impact is harder than possible
 
 
-class ContactState(NamedTuple):
-    """Force of the contact, and when it was measured."""
-
-    time_ns: int
-    force_n: float
-
-
 class ForceLoop:
     """Come down and press with the wanted force: the force mode of an arm that has none."""
 
@@ -210,47 +199,53 @@ class ForceLoop:
                 'arm or a softer fingertip, or allow a larger impact'
             )
         self._controller = ForceController(params.gain_m_s_n(period_s), params.integral_s(period_s), FORCE_SPEED_M_S)
-        self._touched_ns: int | None = None  # start of the rest after the touch; None without contact
-        self._touched_n = 0.0  # the force then
-        self._resting: list[ContactState] = []  # states since the finger must be at rest
+        self._touched: ArmState | None = None  # start of the rest after the touch; None without contact
+        self._resting: list[ArmState] = []  # since the finger must be at rest
         self._heard = False
         self.doubt = ''  # in a sentence, why this force must not be used for control
 
     def restart(self) -> None:
         """The finger is not under force control, or left the surface."""
         self._controller.restart()
-        self._touched_ns, self._heard, self._resting = None, False, []
+        self._touched, self._heard, self._resting = None, False, []
 
-    def velocity_m_s(self, wanted_n: float, contact: ContactState, speed_m_s: float, dt_s: float) -> float:
-        """Return the normal velocity that leads to a wanted force, at a commanded speed along the surface."""
+    def velocity(self, command: ArmCommand, state: ArmState, held_s: float) -> Vector:
+        """Return the velocity for a command, m/s: a wanted force by the loop; down no faster than it can still stop."""
+        if command.force_n is None:
+            self.restart()
+            self.doubt = ''  # a lift begins after it was reported
+            return (*command.tangential_m_s, max(command.normal_m_s, -self.approach_m_s))
+        return (*command.tangential_m_s, self._normal_m_s(command.force_n, command, state, held_s))
+
+    def _normal_m_s(self, wanted_n: float, command: ArmCommand, state: ArmState, dt_s: float) -> float:
+        """Return the normal velocity that leads to a wanted force."""
         touching_n = self._params.touching_n
-        if contact.force_n < (touching_n if self._touched_ns is None else LEFT_FRACTION * touching_n):
+        if state.force_n < (touching_n if self._touched is None else LEFT_FRACTION * touching_n):
             self.restart()
             return -self.approach_m_s
-        if self._touched_ns is None:
-            self._touched_ns, self._touched_n = contact
-        sliding = speed_m_s > SLOWEST_M_S
+        self._touched = self._touched or state
+        sliding = math.hypot(*command.tangential_m_s) > SLOWEST_M_S
         if not sliding and not self._heard:
-            self._listen(self._touched_ns, contact)
+            self._listen(self._touched, state)
             return 0.0
         if not sliding:
             self._controller.restart()  # a spring at rest needs no integral part, and a soft one would oscillate
-        return self._controller.update(wanted_n - contact.force_n, dt_s)
+        return self._controller.update(wanted_n - state.force_n, dt_s)
 
-    def _listen(self, touched_ns: int, contact: ContactState) -> None:
+    def _listen(self, touched: ArmState, state: ArmState) -> None:
         """Rest until the force must be constant; delays are found by the stamps of the force."""
         params = self._params
-        must_rest_ns = touched_ns + round((params.loop_delay_s + LATE_S) * 1e9)
-        if contact.time_ns <= must_rest_ns or (self._resting and contact.time_ns <= self._resting[-1].time_ns):
+        must_rest_ns = touched.time_ns + round((params.loop_delay_s + LATE_S) * 1e9)
+        if state.time_ns <= must_rest_ns or (self._resting and state.time_ns <= self._resting[-1].time_ns):
             return
-        self._resting.append(contact)
-        resting_ns = contact.time_ns - self._resting[0].time_ns
-        middle_ns = contact.time_ns - resting_ns // 2
-        first = [state.force_n for state in self._resting if state.time_ns <= middle_ns]
-        last = [state.force_n for state in self._resting if state.time_ns > middle_ns]
+        self._resting.append(state)
+        resting_ns = state.time_ns - self._resting[0].time_ns
+        middle_ns = state.time_ns - resting_ns // 2
+        first = [one.force_n for one in self._resting if one.time_ns <= middle_ns]
+        last = [one.force_n for one in self._resting if one.time_ns > middle_ns]
         if resting_ns < 2e9 * HALF_S or min(len(first), len(last)) < FEWEST:
             return
-        self._heard, rose_n, met_n = True, fmean(last) - fmean(first), fmean(last) - self._touched_n
+        self._heard, rose_n, met_n = True, fmean(last) - fmean(first), fmean(last) - touched.force_n
         most_n = params.touching_n + HARD * params.max_impact_n
         if rose_n > ROSE_FRACTION * params.touching_n:
             what = f'the force continued to rise by {rose_n:.2f} N while the finger was at rest on the surface'

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from texture_core.config import param
 from texture_core.errors import InvalidParameter
 from texture_core.types import Phase
-from texture_exploration.arms.arm import ArmCommand, ArmState, ForceReading, Vector
+from texture_exploration.arms.arm import ArmCommand, ArmState, Vector
 from texture_exploration.safety import MOST_FORCE_N, MOST_M, SafetyLimits
 
 # --------------------
@@ -105,18 +105,17 @@ class ForceWatch:
     A reading is frozen if it stays the same to the last bit for `frozen_force_s`, in at least `MIN_REPEATS` states
     with new stamps, and this cannot be:
 
-    - a sensor that always carries noise (`ForceReading.NOISY`): at any time;
-    - one that may repeat itself (`MEASURED`): in contact, while the finger moves along the normal;
-    - an arm that holds the force itself (`CONTROLLED`): the same, as long as the wanted force is not reached. The time
-      in which it held the force does not count: the reading also stays until a lift that was commanded takes effect.
+    - a sensor that always carries noise (`Arm.noisy_force`): at any time;
+    - another arm: in contact, while the finger moves along the normal and the wanted force is not reached. The time in
+      which it held the force does not count: the reading also stays until a lift that was commanded takes effect.
 
     The force in free air is compared before and after the slide: what differs is drift, and the true force of the slide
     was wrong by as much.
     """
 
-    def __init__(self, limits: SafetyLimits, reading: ForceReading, wanted_n: float) -> None:
+    def __init__(self, limits: SafetyLimits, noisy: bool, wanted_n: float) -> None:
         self._limits = limits
-        self._reading = reading
+        self._noisy = noisy
         self._wanted_n = wanted_n
         self._first: ArmState | None = None  # the first state with the present reading
         self._newest_ns = 0
@@ -138,7 +137,7 @@ class ForceWatch:
             return ''
         moved_m = abs(arm.position[2] - self._first.position[2])
         moves_in_contact = arm.force_n - self._free_air_n >= CONTACT_N and moved_m >= FROZEN_TRAVEL_M
-        if self._reading is not ForceReading.NOISY and not moves_in_contact:
+        if not self._noisy and not moves_in_contact:
             return ''
         return (
             f'the measured force is frozen: it has been {arm.force_n:.3f} N for {same_s * 1e3:.0f} ms, while the '
@@ -183,7 +182,7 @@ class ForceWatch:
 
     def _holds(self, force_n: float, command: ArmCommand) -> bool:
         """Return whether the arm controls the force to a constant value."""
-        if self._reading is not ForceReading.CONTROLLED:
+        if self._noisy:
             return False
         if command.force_n is None:
             return command.normal_m_s == 0.0

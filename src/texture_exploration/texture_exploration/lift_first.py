@@ -49,9 +49,6 @@ class Rise(Stage):
     rise. Then it rises no faster than the finger comes down, and slower where the force shows a stiffer contact.
     """
 
-    commands = ('rest', 'up')
-    ends = 'the force stayed the same over the clearance'
-    on_error = 'GoBack, Rise again, or end at rest'
     ahead = stays = True
 
     def __init__(
@@ -186,9 +183,6 @@ class Rise(Stage):
 class GoBack(Stage):
     """Go back down, until the force is again what it was before the rise."""
 
-    commands = ('down',)
-    ends = 'the force is as before the rise'
-    on_error = 'end, at rest'
     ahead = stays = True
 
     def __init__(self, before_n: Vector, touch: TouchParams) -> None:
@@ -212,9 +206,6 @@ class CalmDown(Stage):
     as the force stays that of the first rest.
     """
 
-    commands = ('rest', 'up')
-    ends = 'the force sensor is zeroed'
-    on_error = 'GoBack, Rise again, or Lift'
     ahead = True
 
     def __init__(self, zeroed: Callable[[], bool], force_n: float, touch: TouchParams, limits: SafetyLimits) -> None:

@@ -11,11 +11,9 @@ from dataclasses import dataclass
 from texture_core.errors import ExplorationError, MotionAborted, MotionRefused
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.arm import ArmCommand, ArmState, Vector
-from texture_exploration.force_control import HALF_S, HARD, LATE_S
-from texture_exploration.guards import SignalWatchParams
-from texture_exploration.lift_first import MOST_FORCE_SHARE, CalmDown, Detour, GoBack, Rise
+from texture_exploration.lift_first import CalmDown, Detour, Rise
 from texture_exploration.paths import Follower
-from texture_exploration.safety import MOST_FORCE_N, MOST_M, CommandLimits, SafetyLimits
+from texture_exploration.safety import SafetyLimits
 from texture_exploration.stages import (
     AccelerateStage,
     Along,
@@ -28,7 +26,7 @@ from texture_exploration.stages import (
     Stage,
 )
 from texture_exploration.touch import WALL_SHARE, TouchParams
-from texture_exploration.watches import OVERSHOOT, ContactWatch
+from texture_exploration.watches import ContactWatch
 
 # --------------------
 # One step of a motion.
@@ -226,62 +224,3 @@ class Motion:
 # height it lifts, m, in the frame of the surface; how the finger touches; and what is allowed. MotionRefused if a
 # number is out of its range or does not belong to this motion, or the path leaves the workspace.
 Planner = Callable[[ExplorationRequest, Vector, TouchParams, SafetyLimits], Motion]
-
-
-# --------------------
-# The state machine, once: docs/motion.md shows it.
-
-STATES: tuple[type[Stage], ...] = (
-    Rise,
-    CalmDown,
-    GoBack,
-    GoHomeStage,
-    ApproachStage,
-    SettleForceStage,
-    AccelerateStage,
-    SlideStage,
-    BrakeStage,
-    LiftStage,
-)
-
-
-def state_table() -> str:
-    """Return the state machine as rows of a table."""
-    rows = (
-        f'| `{state.__name__}` | {", ".join(state.commands)} | {state.ends} | {state.on_error} |' for state in STATES
-    )
-    return '\n'.join(rows)
-
-
-# --------------------
-# All limits, once, with their defaults: name, quantity, value, who checks, how fast, what follows; docs/motion.md shows
-# them.
-
-
-def limit_table() -> str:
-    """Return the limits as rows of a table."""
-    limits, touch, commands = SafetyLimits(), TouchParams(), CommandLimits()
-    wall_n = WALL_SHARE * limits.force_limit_n
-    timeouts_s = limits.approach_timeout_s, limits.contact_timeout_s, limits.slide_overtime_s, limits.lift_timeout_s
-    return f"""\
-| `MOST_FORCE_N, MOST_M` | number of a sample | finite, {MOST_FORCE_N / 1e3:g} kN, {MOST_M:g} m | arm and Exploration | at once | lift |
-| `force_limit_n` | force in any direction | {limits.force_limit_n:g} N | ForceGuard | each step, 10 ms | way back, lift |
-| `WALL_SHARE` | force at a wall, foreseen | {WALL_SHARE:g} × force_limit_n, {wall_n:g} N | Exploration | before it moves | refused |
-| `friction_limit` | force along the surface | {limits.friction_limit:g} × normal + {limits.tangential_floor_n:g} N | ForceGuard | each step, 10 ms | way back, lift |
-| `x_low_m to z_high_m` | place | ±{limits.x_high_m:g} m; {limits.z_low_m:g} to {limits.z_high_m:g} m | Exploration | each step, 10 ms | lift |
-| `surface_tolerance_m` | height of the contact | {1e3 * limits.surface_tolerance_m:g} mm | Exploration | each step, 10 ms | lift |
-| `state_timeout_s` | age of the state | {limits.state_timeout_s:g} s | Exploration | each step, 10 ms | stop |
-| `signal_timeout_s` | silence of the sensor | {SignalWatchParams().signal_timeout_s:g} s | SignalWatch | each step, 10 ms | lift |
-| `frozen_force_s` | force that repeats | {limits.frozen_force_s:g} s | ForceWatch | each step, 10 ms | lift |
-| `force_drift_fraction` | drift in free air | {100 * limits.force_drift_fraction:g} % | ForceWatch | after the lift | no success |
-| `OVERSHOOT` | force before the slide | {100 * OVERSHOOT:g} % above the wanted | OvershootWatch | 3 steps | lift |
-| `HARD, LATE_S` | force after the first touch | {HARD:g} impacts; {1e3 * LATE_S:g} ms | ForceLoop | delay + {LATE_S + 2 * HALF_S:g} s | lift |
-| `peak_force_fraction` | force in the slide | {100 * touch.peak_force_fraction:g} % above the wanted | SlideWatch | 3 steps | no window |
-| `peak_speed_fraction` | speed in the slide | {100 * touch.peak_speed_fraction:g} % above the wanted | SlideWatch | 50 ms | no window |
-| `lost_contact_s` | time without contact | {touch.lost_contact_s:g} s | ContactWatch | each step, 10 ms | lift |
-| `stall_s` | way by commanded way | {100 * touch.stall_speed_fraction:g} % in {touch.stall_s:g} s | StallWatch | {touch.stall_s:g} s | lift |
-| `MOST_FORCE_SHARE` | change of the force in a rise | {100 * MOST_FORCE_SHARE:g} % of force_limit_n | Rise | each step, 10 ms | go back |
-| `approach_travel_m` | way down in search | {1e3 * touch.approach_travel_m:g} mm | ApproachStage | each step, 10 ms | lift |
-| `approach_timeout_s, …` | time of a stage | {', '.join(f'{one:g}' for one in timeouts_s)} s | Stage | each step, 10 ms | lift |
-| `command_speed_m_s, …` | a single command | {commands.command_speed_m_s:g} m/s, {commands.command_normal_m_s:g} m/s, {commands.command_force_n:g} N | arm | at once | refused, stop |
-""".replace('-', '−')  # noqa: E501  # a row is a line

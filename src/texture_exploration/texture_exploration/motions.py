@@ -7,8 +7,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-import numpy as np
-
 from texture_core.errors import ExplorationError, MotionRefused
 from texture_core.types import ExplorationRequest
 from texture_exploration.arms.arm import Vector
@@ -20,7 +18,6 @@ from texture_exploration.paths import (
     CrossLegs,
     PathFollower,
     StraightPath,
-    StrokeEnds,
     Strokes,
     lead_m,
     ramps_m,
@@ -35,7 +32,6 @@ DEFAULTS: Mapping[str, Mapping[str, float]] = {
     'cross_slide': {'speed_m_s': 0.0255, 'force_n': 1.5, 'distance_m': 0.05},  # Hu et al. 2014, section 5.1; no length
     # A stroke is about what a fingertip reaches; duration: Kaboli et al. 2015.
     'in_hand_sliding': {'speed_m_s': 0.02, 'force_n': 1.0, 'distance_m': 0.02, 'duration_s': 2.0},
-    'in_hand_random': {'speed_m_s': 0.02, 'force_n': 1.0, 'distance_m': 0.02, 'duration_s': 2.0},
 }
 
 # --------------------
@@ -79,36 +75,20 @@ def in_hand_sliding(request: ExplorationRequest, home: Vector, touch: TouchParam
 
     Which fingers slide and which hold is up to the hand (`texture_exploration.arms.in_hand`).
     """
-    return _strokes(request, home, touch, limits, least_fraction=1.0)
-
-
-def in_hand_random(request: ExplorationRequest, home: Vector, touch: TouchParams, limits: SafetyLimits) -> Motion:
-    """Plan the same with strokes of random length, each of at least half of `distance_m`.
-
-    Source: the "random exploratory movements" that Kaboli et al. 2015, section VI, leave to future work.
-    """
-    return _strokes(request, home, touch, limits, least_fraction=0.5)
-
-
-def _strokes(
-    request: ExplorationRequest, home: Vector, touch: TouchParams, limits: SafetyLimits, least_fraction: float
-) -> Motion:
-    """Plan strokes; the shortest is `least_fraction` of the longest."""
     request = limits.complete(request, DEFAULTS['in_hand_sliding'])
-    speed, longest_m = request.speed_m_s, request.distance_m
+    speed, stroke_m = request.speed_m_s, request.distance_m
     turn_s = touch.ramp_s(2 * speed)
-    least_m = (ramps_m(speed, touch.ramp_s(speed)) + speed * turn_s) / least_fraction
+    least_m = ramps_m(speed, touch.ramp_s(speed)) + speed * turn_s
     room = limits.free_distance_m(home, request.direction_rad)
-    if not least_m <= longest_m <= room:
+    if not least_m <= stroke_m <= room:
         raise MotionRefused(
-            f'{request.motion}: distance_m, the length of a stroke, is {longest_m:g}; allowed is '
+            f'{request.motion}: distance_m, the length of a stroke, is {stroke_m:g}; allowed is '
             f'{math.ceil(least_m * 1e4) / 1e4:g} m, to turn at this speed, to {math.floor(room * 1e3) / 1e3:g} m, the '
             'end of the workspace',
-            ExplorationError.OUTSIDE_WORKSPACE if longest_m > room else ExplorationError.INVALID_REQUEST,
+            ExplorationError.OUTSIDE_WORKSPACE if stroke_m > room else ExplorationError.INVALID_REQUEST,
             'distance_m',
         )
-    ends = StrokeEnds(longest_m, least_fraction * longest_m, np.random.default_rng())
-    strokes = Strokes(request.direction_rad, ends, speed, turn_s, speed * request.duration_s)
+    strokes = Strokes(request.direction_rad, stroke_m, speed, turn_s, speed * request.duration_s)
     return Motion(strokes, request, home, touch, limits)
 
 
@@ -168,5 +148,4 @@ MOTIONS: Mapping[str, Planner] = {
     'circular': circular,  # ETS
     'cross_slide': cross_slide,  # Hu et al. 2014: along x and along y
     'in_hand_sliding': in_hand_sliding,  # Kaboli et al. 2015
-    'in_hand_random': in_hand_random,  # its future work: random exploratory movements
 }

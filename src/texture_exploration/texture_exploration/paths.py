@@ -7,8 +7,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple, Protocol
 
-import numpy as np
-
 from texture_exploration.arms.arm import ArmState
 
 # --------------------
@@ -197,19 +195,6 @@ class CircularPath(NamedTuple):
 # To and fro on a line, as a fingertip rubs.
 
 
-class StrokeEnds(NamedTuple):
-    """Where strokes within 0 to `longest_m` end: drawn at each turn, so that each is at least `least_m` long."""
-
-    longest_m: float
-    least_m: float
-    rng: np.random.Generator
-
-    def draw(self, forth: bool, begin_m: float) -> float:
-        """Return where the next stroke ends, m."""
-        low, high = (begin_m + self.least_m, self.longest_m) if forth else (0.0, begin_m - self.least_m)
-        return float(self.rng.uniform(low, max(low, high)))
-
-
 class Strokes(Follower):
     """Steer a finger to and fro on a line.
 
@@ -218,15 +203,14 @@ class Strokes(Follower):
     and nothing is guaranteed until that is over.
     """
 
-    def __init__(self, heading_rad: float, ends: StrokeEnds, speed_m_s: float, turn_s: float, length_m: float) -> None:
+    def __init__(self, heading_rad: float, stroke_m: float, speed_m_s: float, turn_s: float, length_m: float) -> None:
         super().__init__(length_m)
         self._heading_rad = heading_rad
         self._speed_m_s = speed_m_s
         self._turn_s = turn_s
-        self._ends = ends
+        self._stroke_m = stroke_m
         self._runs_on_m = speed_m_s * turn_s / math.pi  # until it stops: the integral of the cosine over half a turn
         self._forth = True
-        self._end_m = ends.draw(True, 0.0)
         self._along_m = self._age_m = 0.0
         self._since_turn_s = math.inf  # since the newest turn began
         self._reversed_s = 0.0  # when, after that, the finger was seen to move the other way; inf until then
@@ -273,7 +257,6 @@ class Strokes(Follower):
         if not self._turning and self._left_m < 0.0:
             self._forth = not self._forth
             self._since_turn_s, self._reversed_s = 0.0, math.inf
-            self._end_m = self._ends.draw(self._forth, self._end_m)
 
     @property
     def _turning(self) -> bool:
@@ -282,7 +265,7 @@ class Strokes(Follower):
     @property
     def _left_m(self) -> float:
         """The way until the turn begins; below 0 beyond it."""
-        left_m = self._end_m - self._along_m if self._forth else self._along_m - self._end_m
+        left_m = self._stroke_m - self._along_m if self._forth else self._along_m
         return left_m - self._runs_on_m
 
 

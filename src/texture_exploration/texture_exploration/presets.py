@@ -42,8 +42,10 @@ def read_preset(content: Mapping[str, Any], name: str, repeats: int = 0) -> list
     """Return all requests in turn, each combination once per round; `repeats` of 0 means that of the preset."""
     where = f"preset '{name}'"
     vary = content.get('vary', {})
-    if not isinstance(vary, Mapping):
-        raise InvalidParameter(f"{where}: 'vary' is {safe_repr(vary)}; a mapping of numbers to lists is needed")
+    if not (isinstance(vary, Mapping) and all(isinstance(values, list) and values for values in vary.values())):
+        raise InvalidParameter(
+            f"{where}: 'vary' is {safe_repr(vary)}; a mapping of names to lists is needed, each a list of numbers"
+        )
     given = {key: value for key, value in content.items() if key not in KEYS}
     for key in (*given, *vary):
         if key not in (*NUMBERS, *SHORTHANDS):
@@ -53,11 +55,6 @@ def read_preset(content: Mapping[str, Any], name: str, repeats: int = 0) -> list
     rounds = content.get('repeats', 1)
     if not isinstance(rounds, int) or not 1 <= rounds <= MOST:
         raise InvalidParameter(f"{where}: 'repeats' is {safe_repr(rounds)}; a whole number from 1 to {MOST} is needed")
-    for key, values in vary.items():
-        if not isinstance(values, list) or not values:
-            raise InvalidParameter(
-                f"{where}: 'vary' gives {safe_repr(values)} for '{key}'; a list of numbers is needed"
-            )
     combinations = math.prod(map(len, vary.values()))
     if combinations > MOST:
         raise InvalidParameter(f"{where}: 'vary' makes {combinations} combinations; at most {MOST} are made")

@@ -32,10 +32,6 @@ class Stage:
 
     ahead = stays = False
     free: bool | None = None
-    # One row of the state machine (docs/motion.md): kinds of what it commands, what ends it, where an error leads.
-    commands: tuple[str, ...] = ()
-    ends = ''
-    on_error = 'Lift'
 
     def __init__(self, phase: Phase, timeout_s: float, goal: str) -> None:
         self.phase = phase
@@ -66,9 +62,6 @@ class Stage:
 
 class GoHomeStage(Stage):
     """Rise to the height of the start, then go above the surface to where the motion begins."""
-
-    commands = ('rest', 'up', 'along')
-    ends = 'above the start of the motion'
 
     def __init__(self, home: Vector, touch: TouchParams, limits: SafetyLimits) -> None:
         super().__init__(Phase.APPROACH, limits.approach_timeout_s, 'the finger to reach the start')
@@ -106,9 +99,6 @@ class GoHomeStage(Stage):
 
 class ApproachStage(Stage):
     """Come down until the force shows contact."""
-
-    commands = ('down',)
-    ends = 'the force shows contact that pushes the finger up'
 
     def __init__(self, force_n: float, touch: TouchParams, limits: SafetyLimits) -> None:
         super().__init__(Phase.APPROACH, limits.approach_timeout_s, 'the finger to meet the surface')
@@ -157,9 +147,6 @@ class ApproachStage(Stage):
 class SettleForceStage(Stage):
     """Press gently harder, until the force has stayed within its tolerance for a while."""
 
-    commands = ('press',)
-    ends = 'the force stayed within its tolerance'
-
     def __init__(self, force_n: float, touch: TouchParams, limits: SafetyLimits) -> None:
         super().__init__(Phase.CONTACT, limits.contact_timeout_s, f'the force to settle at {force_n:g} N')
         self._force_n = force_n
@@ -204,9 +191,6 @@ class Along(NamedTuple):
 class AccelerateStage(Stage):
     """Gain speed smoothly along the path; over when the arm has reached speed and force."""
 
-    commands = ('press',)
-    ends = 'speed and force are reached'
-
     def __init__(self, along: Along) -> None:
         goal = f'the finger to slide at {along.speed_m_s:g} m/s with {along.force_n:g} N'
         super().__init__(Phase.CONTACT, along.ramp_s + along.limits.contact_timeout_s, goal)
@@ -230,9 +214,6 @@ class AccelerateStage(Stage):
 
 class SlideStage(Stage):
     """Keep speed and force for the length of the path."""
-
-    commands = ('press',)
-    ends = 'the end of the path, or an early end'
 
     def __init__(self, along: Along) -> None:
         planned_s = along.follower.length_m / along.speed_m_s
@@ -287,9 +268,6 @@ class BrakeStage(Stage):
     that was lost in the slide and does not come back aborts.
     """
 
-    commands = ('press', 'along', 'rest')
-    ends = 'at rest along the surface'
-
     def __init__(self, along: Along) -> None:
         super().__init__(Phase.LIFT, along.limits.lift_timeout_s, 'the finger to come to rest')
         self._along = along
@@ -327,10 +305,6 @@ class LiftStage(Stage):
     fall, as that of a frozen sensor, does not lift the finger beyond `approach_travel_m`. It goes no faster than it
     came down until the force has fallen: only that proves the direction of the normal.
     """
-
-    commands = ('up',)
-    ends = 'at the height of the start and clear of the surface'
-    on_error = 'end, at rest'
 
     def __init__(self, home: Vector, force_n: float, touch: TouchParams, limits: SafetyLimits) -> None:
         super().__init__(Phase.LIFT, limits.lift_timeout_s, 'the finger to be lifted')

@@ -34,12 +34,7 @@ class TouchParams:
         0.02, 'Highest speed towards the surface; lower for a small force.', unit='m/s', low=0.001, high=0.1
     )
     approach_stiffness_n_m: float = param(
-        2000.0,
-        'Stiffest contact that is expected, also from the side; a larger one lowers the speeds of approach, travel and '
-        'slide, so that the impact stays below its limit.',
-        unit='N/m',
-        low=10.0,
-        high=200000.0,
+        2000.0, 'Stiffest contact, also from the side; larger: slower motion.', unit='N/m', low=10.0, high=200000.0
     )
     approach_travel_m: float = param(
         0.05, 'Longest way down in search of the surface; then it aborts.', unit='m', low=0.001, high=0.5

@@ -39,7 +39,7 @@ objects
     Here: Scene `kaboli`: flat, one skin; scene `kaboli_shapes`: curved, fingers that differ. Sizes are guesses.
 random movements
     Paper: Future work (VI).
-    Here: Motion `in_hand_random`.
+    Here: None.
 """
 
 from __future__ import annotations

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import contextlib
-import enum
 import fcntl
 import math
 import os
@@ -27,7 +26,6 @@ import numpy as np
 from texture_core.config import param
 from texture_core.errors import CommandRefused, DeviceError
 from texture_core.types import Array, rotation_matrix
-from texture_exploration.force_control import ContactState, ForceLoop, ForceLoopParams
 
 # --------------------
 # Interface of every arm that carries the finger.
@@ -89,14 +87,6 @@ class ArmCommand:
 STANDSTILL = ArmCommand()
 
 
-class ForceReading(enum.Enum):
-    """How the measured force of an arm varies without contact changes; decides what counts as a frozen reading."""
-
-    NOISY = enum.auto()  # never twice the same to the last bit: a force sensor finer than its noise
-    MEASURED = enum.auto()  # may stay the same, but not while the finger moves along the normal in contact
-    CONTROLLED = enum.auto()  # the arm may keep it the same while it follows a surface: motor currents, a force mode
-
-
 class Arm:
     """An arm under hybrid control: velocity along the surface, velocity or force along its normal; a base of all arms.
 
@@ -106,7 +96,7 @@ class Arm:
     """
 
     Params: type[Any]
-    force_reading = ForceReading.CONTROLLED
+    noisy_force = False  # its measured force is never twice the same to the last bit, as that of a sensor with noise
     reboots = False
     keeps_start = False  # nothing else moves it: explorations begin at the same place after a release
 
@@ -151,10 +141,6 @@ class Arm:
 
     def warning(self) -> str:
         """Return a warning in a sentence although the arm moves, '' if there is none."""
-        return ''
-
-    def doubt(self) -> str:
-        """Return in a sentence why a motion must end although the arm obeys and can still lift, '' if none."""
         return ''
 
     @property
@@ -296,33 +282,6 @@ def tangential_force_n(force_n: Vector, velocity_m_s: Vector) -> float:
 
 
 # --------------------
-# An arm that accepts only velocities and follows them with a delay, with a force loop of the suite around it.
-
-
-class CommandedVelocity:
-    """Choose the velocity for a command: a wanted force by the force loop, a velocity unchanged.
-
-    Towards the surface a commanded velocity is limited to what the force loop can still stop in time.
-    """
-
-    def __init__(self, params: ForceLoopParams, period_s: float) -> None:
-        self._loop = ForceLoop(params, period_s)
-
-    def doubt(self) -> str:
-        """Return in a sentence why the force of this arm must not be used for control, '' if it may."""
-        return self._loop.doubt
-
-    def choose(self, command: ArmCommand, state: ArmState, held_s: float) -> Vector:
-        """Return the velocity to command, m/s."""
-        if command.force_n is None:
-            self._loop.restart()
-            self._loop.doubt = ''  # a lift begins after it was reported
-            return (*command.tangential_m_s, max(command.normal_m_s, -self._loop.approach_m_s))
-        contact, speed_m_s = ContactState(state.time_ns, state.force_n), math.hypot(*command.tangential_m_s)
-        return (*command.tangential_m_s, self._loop.velocity_m_s(command.force_n, contact, speed_m_s, held_s))
-
-
-# --------------------
 # One commander per robot: a lock that the kernel frees at any end of its holders, and the process that stops the robot.
 
 RUNTIME = Path(
@@ -423,11 +382,7 @@ class ZeroingParams:
     """When a finger counts as in free air; a base of the parameters of each arm that zeroes its force sensor there."""
 
     zero_steady_n: float = param(
-        0.5,
-        'Largest change of the smoothed force that counts as constant; it must exceed the noise of the sensor.',
-        unit='N',
-        low=0.05,
-        high=5.0,
+        0.5, 'Change of the force that counts as none; above the noise of its sensor.', unit='N', low=0.05, high=5.0
     )
 
 

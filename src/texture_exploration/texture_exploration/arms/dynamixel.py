@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
+import functools
 import importlib
 import math
 import os
@@ -13,9 +14,7 @@ import sys
 import termios
 import threading
 import time
-from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import serial
@@ -60,7 +59,6 @@ FIRMWARE = 6  # address of its version, of one byte, in all control tables of pr
 TRIPPED = 0xFF  # the register of the Bus Watchdog after it has stopped the motor
 RESTART_S = 3.0  # a motor has rebooted within
 SILENT = 'does not answer'
-GARBLED = 'answers with data that cannot be read: do two motors have this id, or is the cable damaged?'
 RESET = 'has lost its torque: it was reset, for example by a voltage drop'
 REMEDY = "; when it has cooled and nothing blocks it, reboot it (service '~/reboot') or switch its power off and on"
 HARDWARE_ERRORS = {0: 'input voltage', 2: 'overheating', 3: 'encoder', 4: 'electrical shock', 5: 'overload'}
@@ -103,7 +101,7 @@ class DynamixelBus:
         self.missing: set[int] = set()
         self.limits_a: dict[int, float] = {}
         self.deaf: set[int] = set()  # motors whose watchdog may not stop them
-        self._reasons: dict[int, str] = {}  # why a motor is missing, unless it is silent
+        self._reset: set[int] = set()  # motors that are missing as they have lost their torque
         self._energised: set[int] = set()
         self._goal_currents: dict[int, int] = {}  # as sent last
         self._device = device
@@ -125,7 +123,6 @@ class DynamixelBus:
         first, last = X_SERIES['torque_enable'], X_SERIES['goal_current']
         self._health = (first[0], last[0] + last[1] - first[0])
         self._turn = 0
-        self._garbled = False  # the last answer
 
     def close(self) -> None:
         """Close the port; never raises."""
@@ -155,30 +152,27 @@ class DynamixelBus:
             self.write(motor, 'torque_enable', 1)
             self._energised.add(motor)
             self.missing.discard(motor)
-            self._reasons.pop(motor, None)
+            self._reset.discard(motor)
 
     def why_missing(self, motor: int) -> str:
         """Return why a motor is missing, as text."""
-        return self._reasons.get(motor) or f'{self._profile.owner(motor)} {SILENT}'
+        return f'{self._profile.owner(motor)} {RESET if motor in self._reset else SILENT}'
 
     def _prepare(self, motor: int) -> bool:
         """Set mode, limits and goals of a motor without torque; return whether it answers."""
         profile = self._profile
         model, result = self._ping(motor)
-        self._garbled = result == self._sdk.COMM_RX_CORRUPT
         position = self.read_register(motor, 'present_position') if result == SUCCESS else None
         if position is None:
-            if self._garbled:
-                self._reasons[motor] = f'{profile.owner(motor)} {GARBLED}'
             return False
-        if model not in profile.models:  # or it is a late answer to an earlier request
+        if model != profile.model:  # or it is a late answer to an earlier request
             model, result = self._ping(motor)
             if result != SUCCESS:
                 return False
-        if model not in profile.models:
+        if model != profile.model:
             raise DeviceError(
                 f"{profile.owner(motor)} is of model {describe(model)}; the profile '{profile.name}' is for "
-                f'{", ".join(map(describe, profile.models))}, and with another its forces would be wrong; use a '
+                f'{describe(profile.model)}, and with another its forces would be wrong; use a '
                 'profile for this model'
             )
         self.write(motor, 'torque_enable', 0)  # or the mode cannot be set
@@ -299,12 +293,7 @@ class DynamixelBus:
         data, result = self._read_block(motor, *self._health)
         if result != SUCCESS:
             return ''  # silence is detected elsewhere
-
-        def value(register: str) -> int:
-            address, size = X_SERIES[register]
-            at = address - self._health[0]
-            return int.from_bytes(data[at : at + size], 'little')
-
+        value = functools.partial(register_in, data, self._health[0])
         owner, watchdog = self._profile.owner(motor), self._profile.watchdog
         if bits := value('hardware_error'):
             return self._reported(motor, bits)
@@ -316,10 +305,10 @@ class DynamixelBus:
                 'computer or the bus was delayed; all motors were released'
             )
         if not value('torque_enable') or (watchdog and value('bus_watchdog') != watchdog):
-            self._reasons[motor] = f'{owner} {RESET}'
+            self._reset.add(motor)
             self._energised.discard(motor)
             self.missing.add(motor)
-        elif signed(value('goal_current'), 2) != self._goal_currents[motor]:
+        elif value('goal_current') != self._goal_currents[motor]:
             # A sync write is not answered. Lost or refused: this finds the reason.
             self.write(motor, 'goal_current', self._goal_currents[motor])
         return ''
@@ -355,10 +344,8 @@ class DynamixelBus:
         address, size = X_SERIES[register]
         for _ in range(TRIES):
             data, result = self._read_block(motor, address, size)
-            self._garbled = result == self._sdk.COMM_RX_CORRUPT
             if result == SUCCESS:
-                value = int.from_bytes(data, 'little')
-                return signed(value, size) if size > 1 else value
+                return register_in(data, address, register)
         return None
 
     def _read_block(self, motor: int, address: int, size: int) -> tuple[bytes, int]:
@@ -394,15 +381,9 @@ class DynamixelBus:
         return model, result
 
     def _measured(self, data: bytes) -> MotorState:
-        profile = self._profile
-
-        def value(register: str) -> int:
-            address, size = X_SERIES[register]
-            at = address - self._block[0]
-            return int.from_bytes(data[at : at + size], 'little', signed=True)
-
+        value = functools.partial(register_in, data, self._block[0])
         return MotorState(
-            current_a=value('present_current') * profile.current_a,
+            current_a=value('present_current') * self._profile.current_a,
             velocity_rad_s=value('present_velocity') * VELOCITY_RAD_S,
             position_rad=(value('present_position') - ZERO) * POSITION_RAD,
         )
@@ -434,9 +415,10 @@ def _reasons(bits: int) -> str:
     return ' and '.join(known) or f'hardware error {bits:#04x}'
 
 
-def signed(value: int, size: int) -> int:
-    """Return a register of `size` bytes as a signed number: the SDK gives all as unsigned."""
-    return value - (1 << 8 * size) if value >> (8 * size - 1) & 1 else value
+def register_in(data: bytes, first: int, register: str) -> int:
+    """Return a register, signed if it is longer than a byte, of a part of the table from the address `first` on."""
+    address, size = X_SERIES[register]
+    return int.from_bytes(data[address - first : address - first + size], 'little', signed=size > 1)
 
 
 # --------------------
@@ -444,13 +426,6 @@ def signed(value: int, size: int) -> int:
 
 REPEATS = 5  # a sync write is not answered; one may collide with earlier bytes on the line
 PAUSE_S = 0.02
-
-
-class TorqueGuard(GuardProcess):
-    """The guard of one hand, which holds the lock on its device; start it before the torque is switched on."""
-
-    def __init__(self, device: str, baud: int, packet: bytes, lock: int) -> None:
-        super().__init__(__name__, device, str(baud), packet.hex(), holds=(lock,))
 
 
 def main() -> None:
@@ -478,19 +453,16 @@ CLOSING_M_S = 0.02  # speed of a finger that comes down to press
 REACH_RAD = 0.3  # largest depth of the goal of a pressing motor within the object
 SLACK_RAD = 0.2  # largest distance between the goal and a blocked motor
 LONGEST_STEP_S = 0.05
-RATE_CYCLES = 40  # over which the rate is measured
-SLOW_FRACTION = 0.7  # of the rate of the profile, below which a warning is given
-LATENCY_FILE = '/sys/class/tty/{}/device/latency_timer'  # of adapters by FTDI, ms
 LIMITS = CommandLimits()
 NOT_CONNECTED = 'the hand is not connected; connect it first'
 
 
 class DynamixelHand:
-    """See `texture_exploration.arms.hand.Hand`. One thread owns the bus.
+    """Hold with some fingers, and move others as an arm does; one thread owns the bus.
 
     A motor that is missing or reports an error is named in the fault of the state until the hand is connected again;
     the others go on. However the thread or the process ends, the torque is switched off: by the thread itself, by a
-    `TorqueGuard` when the process is gone; and without a message for the time in the profile, the Bus Watchdog of the
+    guard process when the process is gone; and without a message for the time in the profile, the Bus Watchdog of the
     motors stops them.
     """
 
@@ -502,7 +474,7 @@ class DynamixelHand:
         self._fingers = {name: DynamixelFinger(joints, self.profile) for name, joints in self.profile.fingers.items()}
         self._state: HandState | None = None
         self._failure = NOT_CONNECTED
-        self._warning = self._doubt = ''
+        self._doubt = ''
         self._highest_a: Mapping[int, float] = {}
         self._grip: Mapping[str, float] = {}
         self._commands: dict[str, tuple[ArmCommand, float]] = {}
@@ -515,7 +487,7 @@ class DynamixelHand:
         self.close()
         self._closing.clear()
         self._fresh.clear()
-        self._failure = self._warning = self._doubt = ''
+        self._failure = self._doubt = ''
         self._thread = threading.Thread(target=self._run, name='dynamixel', daemon=True)
         self._thread.start()
         if not self._fresh.wait(FIRST_STATE_S) or self._failure:
@@ -540,7 +512,7 @@ class DynamixelHand:
 
     def warning(self) -> str:
         """Return what is not as it should be although the hand moves, '' if nothing."""
-        return '; '.join(filter(None, (self._doubt, self._warning)))
+        return self._doubt
 
     def grip(self, forces_n: Mapping[str, float]) -> None:
         """Press from the next cycle on."""
@@ -593,7 +565,9 @@ class DynamixelHand:
         bus = guard = None
         try:
             bus = DynamixelBus(self._device, self.profile)
-            guard = TorqueGuard(self._device, self.profile.baud, bus.torque_off_packet(), bus.lock)
+            # It holds the lock on the device, and switches the torque off once this process is gone.
+            line = self._device, str(self.profile.baud), bus.torque_off_packet().hex()
+            guard = GuardProcess(__name__, *line, holds=(bus.lock,))
             self._highest_a = bus.limits_a
             bus.start()
             self._doubt = self._doubtful(bus.deaf)
@@ -619,7 +593,6 @@ class DynamixelHand:
             finger.restart()
         now_s = stepped_s = time.monotonic()
         errors: dict[str, None] = {}
-        cycles: deque[float] = deque(maxlen=RATE_CYCLES)
         while not self._closing.wait(max(0.0, now_s + period_s - time.monotonic())):
             now_s = time.monotonic()
             motors = bus.read()
@@ -633,8 +606,6 @@ class DynamixelHand:
             stepped_s = now_s
             self._publish(self._fault(bus, errors))
             bus.write_goals(goals)
-            cycles.append(now_s)
-            self._warning = self._slowness(cycles)
 
     def _doubtful(self, deaf: Iterable[int]) -> str:
         """Return a warning about motors whose watchdog may not stop them, '' if there are none."""
@@ -644,21 +615,6 @@ class DynamixelHand:
         return (
             f'the watchdog of motors {numbers} may not stop them when the cable is out or the computer hangs: their '
             'firmware is known to go on; update it with DYNAMIXEL Wizard'
-        )
-
-    def _slowness(self, cycles: Sequence[float]) -> str:
-        """Return a warning about the rate of the cycles that began at these times, '' if they are fast enough."""
-        if len(cycles) < RATE_CYCLES:
-            return self._warning
-        rate_hz = (len(cycles) - 1) / (cycles[-1] - cycles[0])
-        if rate_hz >= SLOW_FRACTION * self.profile.rate_hz:
-            return ''
-        latency = Path(LATENCY_FILE.format(Path(self._device).resolve().name))
-        adapter = f' (now {latency.read_text().strip()} ms)' if latency.is_file() else ''
-        return (
-            f'the bus makes {rate_hz:.0f} of {self.profile.rate_hz:g} cycles a second: set the latency timer of '
-            f"the USB adapter to 1 ms{adapter}, raise the baud rate ({self.profile.baud}) or lower 'rate_hz' of the "
-            f"profile '{self.profile.name}'"
         )
 
     def _step(self, motors: Mapping[int, MotorState], dt_s: float, now_s: float) -> dict[int, tuple[float, float]]:

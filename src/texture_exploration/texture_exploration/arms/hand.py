@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Interface of a hand to the explorer: profiles, models of force, finger sets, and a simulated hand."""
+"""Hands: states, finger sets, profiles and models of force, and a simulated hand."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol, get_type_hints
+from typing import Any, NamedTuple, get_type_hints
 
 from texture_core.config import find_file, load_yaml, unknown_name
 from texture_core.errors import DeviceError, InvalidParameter, TextureError
@@ -73,7 +73,7 @@ def describe(model: int) -> str:
 
 
 # --------------------
-# Interface of every hand: hold with some fingers, and move others as an arm does.
+# What every hand has: it holds with some fingers, and moves others as an arm does.
 
 
 class Fingertip(NamedTuple):
@@ -97,33 +97,6 @@ class FingerSet(NamedTuple):
 
     hold: tuple[str, ...]
     slide: tuple[str, ...]
-
-
-class Hand(Protocol):
-    """A hand. Any method but `close` raises DeviceError if it cannot be reached."""
-
-    finger_sets: Mapping[str, FingerSet]
-
-    def connect(self) -> None:
-        """Reach the hand and clear its faults; may be called again after `close`."""
-
-    def close(self) -> None:
-        """Release all fingers; never raises, may be called twice."""
-
-    def state(self) -> HandState:
-        """Return the newest state at once."""
-
-    def grip(self, forces_n: Mapping[str, float]) -> None:
-        """Press with these forces from now on, independent of other commands; CommandRefused as `command`."""
-
-    def command(self, fingers: Sequence[str], command: ArmCommand) -> None:
-        """Let fingers follow a command; it holds for a fraction of a second. CommandRefused if it exceeds limits."""
-
-    def warning(self) -> str:
-        """Return a warning in a sentence although the hand moves, '' if there is none."""
-
-    def reboot(self) -> str:
-        """Release, reboot motors that report an error, stay unconnected; return what was done, or DeviceError."""
 
 
 # --------------------
@@ -161,7 +134,7 @@ class Profile:
     """
 
     name: str
-    models: tuple[int, ...]
+    model: int
     baud: int
     rate_hz: float
     gains: Mapping[str, int]
@@ -183,7 +156,7 @@ class Profile:
     @property
     def current_a(self) -> float:
         """Current per count."""
-        return MODELS[self.models[0]].current_a
+        return MODELS[self.model].current_a
 
     @property
     def watchdog(self) -> int:
@@ -225,7 +198,7 @@ def read_profile(content: Mapping[str, Any], name: str) -> Profile:
     kinds = get_type_hints(Profile)
     profile = Profile(
         name=name,
-        models=tuple(content['models']),
+        model=content['model'],
         gains={register: int(value) for register, value in content['gains'].items()},
         fingers=fingers,
         finger_sets=sets,
@@ -233,7 +206,7 @@ def read_profile(content: Mapping[str, Any], name: str) -> Profile:
         watchdog_s=float(content.get('watchdog_s', Profile.watchdog_s)),
         **{number: kind(content[number]) for number, kind in kinds.items() if number in RANGES},
     )
-    _check_models(profile, where)
+    _check_model(profile, where)
     _check_numbers(profile, where)
     if profile.watchdog_s != 0 and not 1 <= profile.watchdog_s / WATCHDOG_UNIT_S <= MAX_WATCHDOG:
         raise InvalidParameter(
@@ -256,21 +229,19 @@ def _check_numbers(profile: Profile, where: str) -> None:
             raise InvalidParameter(f'{where}: {name} is {number:g}; allowed are {low:g} to {high:g}')
 
 
-def _check_models(profile: Profile, where: str) -> None:
+def _check_model(profile: Profile, where: str) -> None:
     """Refuse motors for which the torque of the profile is wrong: they would press harder or softer than requested."""
-    if not profile.models or any(model not in MODELS for model in profile.models):
+    if profile.model not in MODELS:
         raise InvalidParameter(
-            f'{where}: models is {list(profile.models)}; known are {", ".join(map(describe, MODELS))}, and another '
-            'model has other registers and another torque'
+            f'{where}: model is {profile.model}; known are {", ".join(map(describe, MODELS))}, and another model has '
+            'other registers and another torque'
         )
-    for model in profile.models:
-        scale = MODELS[model]
-        if abs(profile.current_a * profile.torque_nm_a / (scale.current_a * scale.torque_nm_a) - 1) > TOLERANCE:
-            raise InvalidParameter(
-                f'{where}: model {describe(model)} makes {scale.torque_nm_a:.2f} N·m/A at '
-                f'{scale.current_a * 1000:g} mA per count, and the profile says {profile.torque_nm_a:g} N·m/A at '
-                f'{profile.current_a * 1000:g} mA per count; give each model a separate profile, with its torque_nm_a'
-            )
+    expected_nm_a = MODELS[profile.model].torque_nm_a
+    if abs(profile.torque_nm_a / expected_nm_a - 1) > TOLERANCE:
+        raise InvalidParameter(
+            f'{where}: model {describe(profile.model)} makes {expected_nm_a:.2f} N·m/A, and the profile says '
+            f'{profile.torque_nm_a:g} N·m/A; correct its torque_nm_a or its model'
+        )
 
 
 def _joints(roles: Mapping[str, Any], where: str) -> dict[str, Joint]:
@@ -296,7 +267,7 @@ LIMITS = CommandLimits()
 
 
 class SimulatedHand:
-    """Each finger is a separate simulated arm; see `texture_exploration.arms.hand.Hand`."""
+    """Each finger is a separate simulated arm; methods as of `texture_exploration.arms.dynamixel.DynamixelHand`."""
 
     finger_sets: Mapping[str, FingerSet] = FINGER_SETS
 

@@ -13,7 +13,7 @@ from texture_core.errors import DeviceError
 from texture_core.types import DEVICES
 from texture_exploration.arms.arm import Arm, ArmCommand, ArmState, Vector
 from texture_exploration.arms.dynamixel import DynamixelHand
-from texture_exploration.arms.hand import FingerSet, Fingertip, Hand, SimulatedHand
+from texture_exploration.arms.hand import FingerSet, Fingertip, SimulatedHand
 from texture_exploration.safety import CommandLimits
 
 HELD_FRACTION = 0.8  # of the wanted force: a finger that presses with it holds the object
@@ -35,6 +35,7 @@ class InHandParams(CommandLimits):
     device: str = param(f'{DEVICES}/dynamixel', 'Path of the serial device of a Dynamixel hand.')
 
 
+Hand = DynamixelHand | SimulatedHand
 HANDS: Mapping[str, Callable[[InHandParams], Hand]] = {
     'simulated': lambda params: SimulatedHand(limits=params),
     'dynamixel': lambda params: DynamixelHand(params.profile, params.device, params),
@@ -55,13 +56,11 @@ class InHandArm(Arm):
         self._params = params
         self.hand = hand or HANDS[params.hand](params)
         self.fingers: FingerSet = find(self.hand.finger_sets, params.finger_set, 'finger set')
-        self._connected = False
 
     def connect(self) -> None:
         """Reach the hand and close the holding fingers around the object."""
         self.close()
         self.hand.connect()
-        self._connected = True
         try:
             self._take_hold()
         except BaseException:
@@ -70,7 +69,6 @@ class InHandArm(Arm):
 
     def close(self) -> None:
         """Release the object."""
-        self._connected = False
         self.hand.close()
 
     def state(self) -> ArmState:
@@ -81,8 +79,6 @@ class InHandArm(Arm):
         DeviceError
             If the hand is not connected or does not answer.
         """
-        if not self._connected:
-            raise DeviceError('the hand is not connected; connect it first')
         hand = self.hand.state()
         tips = [hand.fingers[name] for name in self.fingers.slide]
         weak = self._weak(LOST_FRACTION)
@@ -104,8 +100,6 @@ class InHandArm(Arm):
         CommandRefused
             If the command is out of the limits of the arm; the fingers stop.
         """
-        if not self._connected:
-            raise DeviceError('the hand is not connected; connect it first')
         self.hand.command(self.fingers.slide, command)
 
     def stop(self) -> None:

@@ -96,7 +96,6 @@ class RailsArm(Arm):
         self._states: deque[tuple[int, Vector]] = deque(maxlen=SPEED_OVER)  # device time in µs, and place
         self._state: ArmState | None = None
         self._watchdog_stops = 0
-        self._refused = 0
 
     def connect(self) -> None:
         """Open the line, clear faults and wait for the first state.
@@ -172,12 +171,11 @@ class RailsArm(Arm):
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Totals: states taken, damaged or lost on the line, of another version, and stops of the watchdog."""
+        """Totals: states taken, damaged or lost on the line, and stops of the watchdog."""
         return {
             'states': self._deframer.frames,
             'bad_frames': self._deframer.bad_frames,
             'lost_frames': self._deframer.lost,
-            'refused_frames': self._refused,
             'watchdog_stops': self._watchdog_stops,
         }
 
@@ -203,7 +201,6 @@ class RailsArm(Arm):
         if frame.kind != STATE:
             return
         if frame.version != VERSION or len(frame.body) != STATE_BODY.size:
-            self._refused += 1
             self._failure = (
                 f'the rails send states of version {frame.version}, and {VERSION} is known; update the firmware '
                 'or this package'

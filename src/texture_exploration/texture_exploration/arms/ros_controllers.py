@@ -21,8 +21,6 @@ from texture_exploration.arms.arm import (
     STANDSTILL,
     ArmCommand,
     ArmState,
-    CommandedVelocity,
-    ForceReading,
     SurfaceArm,
     Vector,
     give_up_when_ending,
@@ -36,6 +34,7 @@ from texture_exploration.arms.tool_state import (
     RosControllersParams,
     ToolState,
 )
+from texture_exploration.force_control import ForceLoop
 from texture_exploration.guards import GAP_NS, Listening
 
 
@@ -106,7 +105,7 @@ class RosControllersArm(SurfaceArm):
     """
 
     Params = RosControllersParams
-    force_reading = ForceReading.NOISY
+    noisy_force = True
     _params: RosControllersParams
     _state: ArmState
     _command: tuple[ArmCommand, int] | None  # and when it came
@@ -127,7 +126,6 @@ class RosControllersArm(SurfaceArm):
         self._topics: ControllerTopics | None = None
         self._thread: threading.Thread | None = None
         self._closing = threading.Event()
-        self._late = 0
         self._restart()
 
     def check(self) -> None:
@@ -138,11 +136,7 @@ class RosControllersArm(SurfaceArm):
         DeviceError
             If one of them does not come within `connect_timeout_s`; it names which.
         """
-        topics = self._begin()
-        try:
-            self._wait_for_controllers(topics)
-        finally:
-            topics.close()
+        self._reached().close()
 
     def connect(self) -> None:
         """Wait for the first pose, the first force and a controller that subscribes, and begin to command.
@@ -152,12 +146,7 @@ class RosControllersArm(SurfaceArm):
         DeviceError
             If one of them does not come within `connect_timeout_s`; it names which.
         """
-        topics = self._begin()
-        try:
-            self._wait_for_controllers(topics)
-        except DeviceError:
-            topics.close()
-            raise
+        topics = self._reached()
         self._closing.clear()
         self._topics = topics
         if self._own_thread:
@@ -245,10 +234,7 @@ class RosControllersArm(SurfaceArm):
     def counts(self) -> Mapping[str, int]:
         """Totals of this connection."""
         self._connected()
-        return {
-            'zeroed': self._tool.zero.zeroings,
-            'late_periods': self._late,
-        }
+        return {'zeroed': self._tool.zero.zeroings}
 
     def step(self) -> None:
         """Take what was measured, and send what the newest command needs now; zero velocity if that fails.
@@ -288,19 +274,26 @@ class RosControllersArm(SurfaceArm):
         self._state = replace(self._tool.state(fault), unsafe=self._unsafe)
         self._zeroed = self._tool.zero.zeroed  # after the state, so that a reader finds the zeroed force
         self._carry_out(topics, self._due(now_ns), held_s)
+        self._state = replace(self._state, unsafe=self._unsafe or self._loop.doubt)
         topics.beat(moving=not self._tool.rest.at_rest)
 
-    def _begin(self) -> ControllerTopics:
-        """Close an earlier connection, and open the topics of a new one."""
+    def _reached(self) -> ControllerTopics:
+        """Close an earlier connection; return the topics of a new one, once all is there."""
         self.close()
         self._restart()
-        return self._open_topics(self._params)
+        topics = self._open_topics(self._params)
+        try:
+            self._wait_for_controllers(topics)
+        except BaseException:
+            topics.close()
+            raise
+        return topics
 
     def _restart(self) -> None:
         params = self._params
         loop = replace(params, loop_delay_s=min(0.1, params.loop_delay_s + params.force_smoothing_s))
         self._tool = ToolState(params)
-        self._velocity = CommandedVelocity(loop, 1.0 / params.rate_hz)
+        self._loop = ForceLoop(loop, 1.0 / params.rate_hz)
         self._follow = FollowWatch()
         self._state = self._tool.state('')
         self._command = None
@@ -311,10 +304,6 @@ class RosControllersArm(SurfaceArm):
         self._unsafe = ''  # why it may only be lifted, until it is recovered or connected again
         self._lost = ''  # a fault that stays as long
         self._failed = ''  # with an internal error
-
-    def doubt(self) -> str:
-        """Return in a sentence that the force is too late for force control, '' if not."""
-        return self._velocity.doubt()
 
     def warning(self) -> str:
         """Return in a sentence that clocks do not agree, '' if they do."""
@@ -422,7 +411,7 @@ class RosControllersArm(SurfaceArm):
         state = self._state
         if command is not None and command.force_n is not None:
             self._tool.zero.presume_contact()
-        velocity = REST if state.fault else self._velocity.choose(command or STANDSTILL, state, held_s)
+        velocity = REST if state.fault else self._loop.velocity(command or STANDSTILL, state, held_s)
         if velocity != REST:
             self._tool.rest.forget()
         if not self._tool.rest.at_rest:
@@ -443,12 +432,8 @@ class RosControllersArm(SurfaceArm):
         try:
             while not self._closing.is_set():
                 self.step()
-                due_s += period_s
-                left_s = due_s - time.monotonic()
-                if left_s < -period_s:
-                    self._late += 1
-                    due_s = time.monotonic()
-                self._closing.wait(max(0.0, left_s))
+                due_s = max(due_s + period_s, time.monotonic())  # missed periods are not repeated
+                self._closing.wait(due_s - time.monotonic())
         finally:
             # Also when a bug ends the loop: no arm is left moving.
             topics.send_velocity(REST)

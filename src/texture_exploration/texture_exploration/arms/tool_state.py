@@ -49,19 +49,7 @@ class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams, Co
         '', "Frame in which velocities are commanded, the base frame or that of the fingertip; '' is the base."
     )
     rate_hz: float = param(
-        250.0,
-        'Rate of commands; a higher rate reacts faster and costs computing time.',
-        unit='Hz',
-        low=20.0,
-        high=500.0,
-    )
-    loop_delay_s: float = param(
-        0.02,
-        'Largest delay from a measured force to the motion that responds to it; a longer one is measured as the '
-        'finger comes down. Larger values lower the gain.',
-        unit='s',
-        low=0.0,
-        high=0.1,
+        250.0, 'Rate of commands; higher: faster reaction, more computing.', unit='Hz', low=20.0, high=500.0
     )
     controller_timeout_s: float = param(
         0.0, 'Time without a command after which the controller stops the arm; 0: never.', unit='s', low=0.0, high=0.5

@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import importlib.util
 import json
 import os
+import re
 import signal
 import socket
-import struct
 import subprocess
 import sys
 import threading
@@ -27,7 +28,6 @@ from texture_exploration.arms.arm import (
     STANDSTILL,
     ArmCommand,
     ArmState,
-    ForceReading,
     SurfaceArm,
     SurfacePoseParams,
     Vector,
@@ -37,67 +37,6 @@ from texture_exploration.arms.arm import (
     tangential_force_n,
 )
 from texture_exploration.safety import CommandLimits
-
-# --------------------
-# A TCP connection to a controller, with a time limit on every answer.
-
-
-class TcpConnection:
-    """A TCP connection with a time limit on every wait, and a message for every failure."""
-
-    def __init__(self, ip: str, port: int, timeout_s: float) -> None:
-        self._where = f'{ip}:{port}'
-        self._timeout_s = timeout_s
-        self._end_s = time.monotonic() + timeout_s
-        try:
-            self._socket = socket.create_connection((ip, port), timeout_s)
-        except OSError as error:
-            if isinstance(error, ConnectionRefusedError):
-                raise DeviceError(
-                    f"nothing listens on {self._where}; is the controller on, and is parameter 'ip' its address?"
-                ) from error
-            raise DeviceError(
-                f"{self._where} cannot be reached: {error}; is the controller on, and is parameter 'ip' its address?"
-            ) from error
-
-    def close(self) -> None:
-        """Close the connection."""
-        self._socket.close()
-
-    def send(self, data: bytes) -> None:
-        """Send all of it."""
-        try:
-            self._socket.sendall(data)
-        except OSError as error:
-            raise self._silent() from error
-
-    def read(self, size: int) -> bytes:
-        """Return exactly `count` bytes."""
-        data = b''
-        while len(data) < size:
-            try:
-                self._socket.settimeout(max(0.001, self._end_s - time.monotonic()))
-                chunk = self._socket.recv(size - len(data))
-            except OSError as error:
-                raise self._silent() from error
-            if not chunk:
-                raise self._silent()
-            data += chunk
-        return data
-
-    def read_line(self) -> str:
-        """Return the next line."""
-        line = b''
-        while not line.endswith(b'\n'):
-            line += self.read(1)
-        return line.decode('utf-8', 'replace').strip()
-
-    def _silent(self) -> DeviceError:
-        return DeviceError(
-            f'{self._where} takes connections but does not answer as a UR controller within {self._timeout_s:g} s; '
-            "wait until it has started, restart it, or correct parameter 'ip'"
-        )
-
 
 # --------------------
 # Messages between the arm and its worker process: datagrams on a socket pair, a letter and JSON in each.
@@ -124,10 +63,8 @@ class UrReport(NamedTuple):
     says that its sensor was zeroed since the arm was connected or recovered. `watchdog_s` is how long the controller's
     watchdog waits.
 
-    `counts` are totals since the arm was connected. `late`: gaps of more than 20 ms in what the controller sends.
-    `refused`: commands that it did not accept. `zeroed`: zeroings of the force sensor. `slow_acknowledgements`:
-    commands that took longer than the watchdog waits while the arm moves; `slowest_acknowledgement_ms`: the longest
-    that any took.
+    `counts` are totals since the arm was connected. `refused`: commands that the controller did not accept. `zeroed`:
+    zeroings of the force sensor.
     """
 
     time_ns: int
@@ -165,11 +102,7 @@ class UrArmParams(ZeroingParams, SurfacePoseParams, CommandLimits):
         0.2, 'How long a command holds without a new one; afterwards the arm stops.', unit='s', low=0.02, high=2.0
     )
     watchdog_hz: float = param(
-        10.0,
-        'Lowest rate of commands at which the controller keeps the arm moving; a higher rate stops it sooner.',
-        unit='Hz',
-        low=1.0,
-        high=50.0,
+        10.0, 'Rate of commands below which the controller stops the arm.', unit='Hz', low=1.0, high=50.0
     )
     silence_s: float = param(
         0.1, 'How long the controller may send no state before that is a fault.', unit='s', low=0.02, high=2.0
@@ -181,7 +114,6 @@ class UrArmParams(ZeroingParams, SurfacePoseParams, CommandLimits):
 
 RATE_HZ = 250.0  # of commands and states: half of that of an e-Series
 DELAY_S = 0.02  # from a force to the motion that responds to it: walls were pressed with 26 to 40 N at 50 mm/s
-ACCELERATION_M_S2 = 2.0  # towards a new velocity: 50 mm/s after 25 ms
 ACKNOWLEDGE_S = (
     1.0  # time that a controller may take to stop, to end force control and to zero; its watchdog waits as long
 )
@@ -281,18 +213,12 @@ class WorkerLink:
 #
 # Source: the RTDE guide and the dashboard guide of Universal Robots.
 
-RTDE_PORT = 30004
 DASHBOARD_PORT = 29999
-FIRST_WITHOUT_DASHBOARD = 10  # PolyScope X: neither its safety nor its programs can be asked for
 FIRST_WITH_REMOTE_CONTROL = (5, 6)
 # Oldest software by series: the oldest CB3 that ur-rtde 1.6.5 is tested with (its README); an e-Series with remote
 # control.
 OLDEST: Mapping[int, tuple[int, int]] = {3: (3, 12), 5: (5, 6)}
 CB3 = 3  # the series without a force sensor in the flange
-
-REQUEST_VERSION = 86  # 'V', types of RTDE messages
-CONTROLLER_VERSION = 118  # 'v'
-PROTOCOL_VERSION = 2
 
 PROGRAM_PLAYING = 2  # runtime_state
 
@@ -311,64 +237,65 @@ SAFETY_FAULTS: Mapping[int, str] = {
     13: 'three-position enabling stop',
 }
 
-# Force control about a fixed frame; the other axes may deviate by 0.1 m and 20°, as in PolyScope.
-FORCE_FRAME_FIXED = 2
-FORCE_DEVIATION_M = 0.1
-FORCE_DEVIATION_RAD = 0.349
-STOP_DECELERATION_M_S2 = 10.0  # the default of ur-rtde
-
 
 # --------------------
 # Check in plain Python, within a fixed time, whether a UR controller is present and ready.
 #
 # ur-rtde waits without a limit for a controller that does not answer; so it only connects to one that does.
 
-HEADER = struct.Struct('>HB')
 FREE_MODES = ('NORMAL', 'REDUCED')
 UNLOCK_WAIT_S = 8.0  # the controller refuses for 5 s
 UNLOCK_RETRY_S = 0.25
 
 
-def rtde_version(ip: str, timeout_s: float) -> tuple[int, int]:
-    """Return the major and minor version of the controller."""
-    with closing(TcpConnection(ip, RTDE_PORT, timeout_s)) as line:
-        _ask(line, REQUEST_VERSION, struct.pack('>H', PROTOCOL_VERSION))
-        answer = _ask(line, CONTROLLER_VERSION, b'')
-    if len(answer) < 8:
-        raise DeviceError(f'{ip}:{RTDE_PORT} does not report its version; is it a UR controller?')
-    major, minor = struct.unpack_from('>2I', answer)
-    return major, minor
-
-
-def _ask(line: TcpConnection, kind: int, payload: bytes) -> bytes:
-    """Send a message and return the payload of the answer of the same type; others, such as texts, are skipped."""
-    line.send(HEADER.pack(HEADER.size + len(payload), kind) + payload)
-    while True:
-        size, answered = HEADER.unpack(line.read(HEADER.size))
-        answer = line.read(max(0, size - HEADER.size))
-        if answered == kind:
-            return answer
-
-
-class DashboardClient(TcpConnection):
-    """The dashboard server of a controller: one line per request, one line per answer."""
+class DashboardClient:
+    """The dashboard server of a controller: one line per request, one line per answer, all within a time limit."""
 
     def __init__(self, ip: str, timeout_s: float) -> None:
-        super().__init__(ip, DASHBOARD_PORT, timeout_s)
-        self.read_line()  # its greeting
+        self._where = f'{ip}:{DASHBOARD_PORT}'
+        self._timeout_s = timeout_s
+        self._end_s = time.monotonic() + timeout_s
+        try:
+            self._socket = socket.create_connection((ip, DASHBOARD_PORT), timeout_s)
+        except OSError as error:
+            if not isinstance(error, ConnectionRefusedError):
+                what = "is the controller on, and is parameter 'ip' its address?"
+                raise DeviceError(f'{self._where} cannot be reached: {error}; {what}') from error
+            raise DeviceError(
+                f"nothing listens on {self._where}; is the controller on, and is parameter 'ip' its address? For "
+                "PolyScope X, which has no dashboard, use the arm 'ros_controllers' with ur_robot_driver"
+            ) from error
+        self._read_line()  # its greeting
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._socket.close()
 
     def ask(self, line: str) -> str:
         """Return the answer to a command."""
-        self.send(line.encode() + b'\n')
-        return self.read_line()
+        with contextlib.suppress(OSError):  # reading names what is wrong
+            self._socket.sendall(line.encode() + b'\n')
+        return self._read_line()
+
+    def _read_line(self) -> str:
+        line = b''
+        while not line.endswith(b'\n'):
+            self._socket.settimeout(max(0.001, self._end_s - time.monotonic()))
+            with contextlib.suppress(OSError):
+                if byte := self._socket.recv(1):
+                    line += byte
+                    continue
+            raise DeviceError(
+                f'{self._where} takes connections but does not answer as a UR controller within {self._timeout_s:g} s; '
+                "wait until it has started, restart it, or correct parameter 'ip'"
+            )
+        return line.decode('utf-8', 'replace').strip()
 
 
 def check_ready(ip: str, timeout_s: float) -> tuple[int, int]:
     """Return the version of a controller whose arm can move."""
-    end_s = time.monotonic() + timeout_s
-    version = rtde_version(ip, timeout_s)
-    _check_version(ip, version)
-    with closing(DashboardClient(ip, max(0.1, end_s - time.monotonic()))) as dashboard:
+    with closing(DashboardClient(ip, timeout_s)) as dashboard:
+        version = _checked_version(ip, dashboard.ask('PolyscopeVersion'))
         mode = dashboard.ask('robotmode')
         if 'RUNNING' not in mode:
             raise DeviceError(f"the arm at {ip} answers '{mode}'; switch it on and release its brakes")
@@ -383,18 +310,21 @@ def check_ready(ip: str, timeout_s: float) -> tuple[int, int]:
     return version
 
 
-def _check_version(ip: str, version: tuple[int, int]) -> None:
-    if version[0] >= FIRST_WITHOUT_DASHBOARD:
+def _checked_version(ip: str, answer: str) -> tuple[int, int]:
+    """Return the major and minor version in an answer such as 'URSoftware 5.12.2.1101534 (Nov 02 2022)'."""
+    numbers = re.search(r'(\d+)\.(\d+)', answer)
+    if numbers is None:
         raise DeviceError(
-            f'the controller at {ip} has the software {version[0]}.{version[1]} (PolyScope X) without a dashboard, by '
-            "which the arm 'ur' checks safety and programs; use the arm 'ros_controllers' with ur_robot_driver"
+            f"the controller at {ip} answers '{answer}' when asked for its version; is it a UR controller?"
         )
+    version = int(numbers[1]), int(numbers[2])
     oldest = OLDEST.get(version[0], min(OLDEST.values()))
     if version < oldest:
         raise DeviceError(
             f'the controller at {ip} has the software {version[0]}.{version[1]}, which is too old for force control, '
             f'zeroing of the force sensor or the watchdog; update it to {oldest[0]}.{oldest[1]} or newer'
         )
+    return version
 
 
 def unlock_protective_stop(ip: str, timeout_s: float) -> None:
@@ -478,7 +408,7 @@ class UrArm(SurfaceArm):
     """
 
     Params = UrArmParams
-    force_reading = ForceReading.NOISY  # in double precision
+    noisy_force = True  # in double precision
     _params: UrArmParams
 
     def __init__(self, params: UrArmParams = UrArmParams()) -> None:

@@ -22,20 +22,15 @@ from typing import Any
 from texture_core.config import from_mapping
 from texture_exploration.arms.arm import CALM_NS, ZERO_RISE_M, FreeAir, SurfaceFrame, Vector
 from texture_exploration.arms.ur import (
-    ACCELERATION_M_S2,
     ACKNOWLEDGE_S,
     COMMAND,
     FAILURE,
-    FORCE_DEVIATION_M,
-    FORCE_DEVIATION_RAD,
-    FORCE_FRAME_FIXED,
     LARGEST,
     PROGRAM_PLAYING,
     RATE_HZ,
     RECOVER,
     REPORT,
     STOP,
-    STOP_DECELERATION_M_S2,
     UrArmParams,
     UrCommand,
     UrReport,
@@ -64,8 +59,6 @@ class Watchdog:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.armed = False
-        self.slow = 0
-        self.slowest_s = 0.0
         self._control = control
         self._period_s = self.moving_s = 1.0 / params.watchdog_hz
         self._patient_s = max(ACKNOWLEDGE_S, self._period_s)
@@ -95,12 +88,7 @@ class Watchdog:
     def call(self, command: Callable[..., Any], *arguments: Any) -> bool:
         """Send a command that is acknowledged; return whether the controller accepted it."""
         self._guard(self._patient_s)
-        begin_s = self._clock()
-        taken = bool(command(*arguments))
-        passed_s = self._clock() - begin_s
-        self.slow += passed_s > self._period_s
-        self.slowest_s = max(self.slowest_s, passed_s)
-        return taken
+        return bool(command(*arguments))
 
     def _set(self, period_s: float) -> float:
         """Return the duration."""
@@ -116,6 +104,12 @@ class Watchdog:
 # stream are not acknowledged: a second one would overwrite the first before it is read. So each cycle sends one of
 # them, and commands that must hold are repeated.
 
+ACCELERATION_M_S2 = 2.0  # towards a new velocity: 50 mm/s after 25 ms
+# Force control about a fixed frame; the other axes may deviate by 0.1 m and 20°, as in PolyScope.
+FORCE_FRAME_FIXED = 2
+FORCE_DEVIATION_M = 0.1
+FORCE_DEVIATION_RAD = 0.349
+STOP_DECELERATION_M_S2 = 10.0  # the default of ur-rtde
 TURN_NS = 100_000_000  # in which an arm has turned back
 
 
@@ -310,7 +304,6 @@ class Observer:
         self._stamp = -1.0
         self._time_ns = time.monotonic_ns()
         self._silent_for_s = 0.0
-        self._late = 0
 
     def run(self) -> None:
         """Check in every cycle for a new state."""
@@ -331,8 +324,7 @@ class Observer:
             self._silent_for_s, self.silent = 0.0, False
             self._report()
             return
-        previous_s, self._silent_for_s = self._silent_for_s, self._silent_for_s + passed_s
-        self._late += previous_s <= LATE_S < self._silent_for_s
+        self._silent_for_s += passed_s
         if self._silent_for_s > self._silence_s and not self.silent:
             self.silent = True
             self._report()
@@ -349,7 +341,7 @@ class Observer:
             playing=receive.getRuntimeState() == PROGRAM_PLAYING,
             silent=self.silent,
             zeroed=self.zeroed,
-            counts={'late': self._late, **self.counts},
+            counts=self.counts,
         )
         self.newest = report
         try:
@@ -421,16 +413,11 @@ class Worker:
 
     def _update_observer(self) -> None:
         """Pass on to the observer what it reports in addition to the measurements."""
-        commands, watchdog = self._commands, self._watchdog
+        commands = self._commands
         # After the cycle and not at once: a force that is reported as zeroed is from after the zeroing.
         self._observer.zeroed = commands.trusted
-        self._observer.watchdog_s = watchdog.moving_s
-        self._observer.counts = {
-            'refused': commands.refused,
-            'zeroed': commands.zeroings,
-            'slow_acknowledgements': watchdog.slow,
-            'slowest_acknowledgement_ms': round(watchdog.slowest_s * 1e3),
-        }
+        self._observer.watchdog_s = self._watchdog.moving_s
+        self._observer.counts = {'refused': commands.refused, 'zeroed': commands.zeroings}
 
     def _watch_program(self) -> None:
         """Detect another program: one that plays again after a stop was started by others.

@@ -93,12 +93,7 @@ class ExplorerParams:
         'lifecycle manager.',
     )
     estimate_timeout_s: float = param(
-        1.0,
-        'How long to wait for the final estimates after the finger was lifted; longer than the 0.3 s for which '
-        'feature_extractor waits for samples that do not come.',
-        unit='s',
-        low=0.0,
-        high=60.0,
+        1.0, 'How long to wait for the final estimates after the lift; above 0.3 s.', unit='s', low=0.0, high=60.0
     )
     surface_frame_id: str = param(
         'surface',
