@@ -721,6 +721,22 @@ def test_no_hidden_force_follows_from_what_is_not_as_the_arm_is_told(lie, stiffn
     assert end_n < 0.5 or not outcome.lifted
 
 
+@pytest.mark.parametrize('further_m', np.linspace(0.0, 5e-4, 11))
+def test_a_finger_that_barely_shows_a_wall_on_its_way_to_the_start_is_taken_off_it(further_m):
+    """The arm stops later than the command, so the force grows after the end of the way, 20 kN/m."""
+    wall_m = WALL['wall_m'] + further_m
+    robot = Robot(replace(NO_NOISE, force_noise_n=0.01, stiffness_n_m=20000.0, wall_m=wall_m, friction=0.3))
+    robot.machine.position = robot.machine.position - [TRAVEL_M, 0.0, 0.0]
+    robot.connect()
+    robot.pass_time(0.05)
+    home = (WALL['wall_m'] + 0.02, 0.0, robot.arm.state().position[2])
+    outcome = robot.explore(SLIDE, touch=TouchParams(approach_stiffness_n_m=20000.0), home=home)
+    robot.pass_time(0.2)
+    assert not outcome.success
+    assert outcome.lifted
+    assert robot.pressed_n[-1] < 0.5
+
+
 def longest_above(forces_n, limit_n):
     """Return the largest number of readings in a row above a limit."""
     longest = run = 0

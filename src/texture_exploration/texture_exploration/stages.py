@@ -18,6 +18,7 @@ from texture_exploration.watches import ContactLost, ContactWatch, OvershootWatc
 
 NEAR_M = 0.0005
 GROWTH_M = 0.002
+REST_S = 0.1  # of rest at the end of a lift with a force: the latest arm has stopped
 LEAST_LIFT_M_S = 0.005  # a lift without proof of free air also ends in time
 PRESSING_S = 0.1  # from contact to the wanted force: a step would oscillate on a stiff surface
 STEADY_HORIZON_S = 0.1  # the longest time for which a slide guarantees speed and force; ending it early takes as long
@@ -318,6 +319,7 @@ class LiftStage(Stage):
         self._lowest_m = self._lowest_n = math.inf
         self._newly = (math.inf, math.inf)  # height and force a little lower
         self._proven = False
+        self._top_ns: int | None = None  # since when it rests at the height with a force
 
     def begin(self, time_ns: int, arm: ArmState) -> None:
         """Choose the height."""
@@ -325,7 +327,7 @@ class LiftStage(Stage):
         self._highest_m = max(self._goal_m, arm.position[2] + self._touch.approach_travel_m)
         slower_s_m = 1.0 / self._gentle_m_s - 1.0 / self._touch.lift_speed_m_s
         self.timeout_s = self._base_timeout_s + (self._highest_m - arm.position[2]) * slower_s_m
-        self._lowest_m, self._proven = math.inf, False
+        self._lowest_m, self._proven, self._top_ns = math.inf, False, None
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Go up."""
@@ -333,9 +335,12 @@ class LiftStage(Stage):
         self._watch_rise(arm)
         if arm.force_n > self._touch.contact_force_n:
             self._goal_m = min(self._highest_m, max(self._goal_m, arm.position[2] + self._touch.clearance_m))
-        if arm.position[2] >= self._goal_m - NEAR_M:
-            return None
-        return ArmCommand(normal_m_s=self._touch.lift_speed_m_s if self._proven else self._gentle_m_s)
+        if arm.position[2] < self._goal_m - NEAR_M:
+            self._top_ns = None
+            return ArmCommand(normal_m_s=self._touch.lift_speed_m_s if self._proven else self._gentle_m_s)
+        # What the finger met stops it later than the command: only the force at rest shows whether it must go back.
+        self._top_ns = time_ns if self._top_ns is None else self._top_ns
+        return None if self.free or time_ns - self._top_ns > REST_S * 1e9 else ArmCommand()
 
     def watch_anew(self) -> None:
         """Watch the force from here on: that on the way back from an obstacle is no part of the rise."""
