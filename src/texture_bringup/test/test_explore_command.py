@@ -100,17 +100,19 @@ def test_identify_makes_the_slide_that_distinguishes_textures_until_one_is_decid
 
 
 @pytest.mark.parametrize(
-    ('known', 'message', 'text'),
+    ('rejection', 'message', 'reason'),
     [
-        (True, '', 'glass, confidence 0.78 after 2.9 s'),
-        (False, OUTSIDE, f'unknown (nearest: glass, confidence 0.78 after 2.9 s): {OUTSIDE}'),
-        (False, '', 'unknown (nearest: glass, confidence 0.78 after 2.9 s): it resembles no trained texture'),
+        (Rejection.NONE, '', None),
+        (Rejection.NOVEL, OUTSIDE, OUTSIDE),
+        (Rejection.NOVEL, '', 'it resembles no trained texture'),
+        (Rejection.AMBIGUOUS, '', 'ambiguous'),
+        (Rejection.TOO_LITTLE_TRAINING, '', 'too little training'),
     ],
 )
-def test_an_estimate_that_is_not_known_leads_with_that_and_says_why(known, message, text):
-    rejection = Rejection.NONE if known else Rejection.NOVEL
+def test_an_estimate_that_is_not_known_leads_with_that_and_says_why(rejection, message, reason):
+    nearest = 'glass, confidence 0.78 after 2.9 s'
     estimate = TextureEstimate(0, 'one', 'glass', rejection, 0.78, evidence_s=2.9, message=message)
-    assert texture_text(estimate) == text
+    assert texture_text(estimate) == (f'unknown (nearest: {nearest}): {reason}' if reason else nearest)
 
 
 def test_the_help_lists_the_motions(capsys):

@@ -190,7 +190,10 @@ def texture_text(estimate: TextureEstimate) -> str:
     if not estimate.label:
         return estimate.message or 'none yet'
     nearest = f'{estimate.label}, confidence {estimate.confidence:.2f} after {estimate.evidence_s:.1f} s'
-    return nearest if estimate.accepted else f'unknown (nearest: {nearest}): {estimate.message or UNLIKE}'
+    if estimate.accepted:
+        return nearest
+    reason = UNLIKE if estimate.rejection is Rejection.NOVEL else estimate.rejection.name.lower().replace('_', ' ')
+    return f'unknown (nearest: {nearest}): {estimate.message or reason}'
 
 
 def roughness_text(estimate: RoughnessEstimate) -> str:

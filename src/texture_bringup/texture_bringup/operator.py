@@ -239,7 +239,8 @@ class Operator:
         except MotionAborted as error:
             withdrawn = self._withdraw(goal_id)
             self._executor.spin_until_future_complete(withdrawn, CONFIRM_S)
-            how = 'it has confirmed' if withdrawn.done() else 'look at the robot: it has not confirmed'
+            confirmed = withdrawn.done() and withdrawn.result().goals_canceling  # none if the goal is unknown there
+            how = 'it has confirmed' if confirmed else 'look at the robot: it has not confirmed'
             raise MotionAborted(f'{error}; {how} that the request is withdrawn') from error
         except KeyboardInterrupt:  # the explorer may have the request already
             self._withdraw(goal_id)

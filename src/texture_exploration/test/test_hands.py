@@ -7,6 +7,7 @@ They hold and slide; whatever ends the command of motors ends their torque, and 
 
 import math
 import os
+import re
 import signal
 import struct
 import subprocess
@@ -304,7 +305,15 @@ def test_a_late_answer_to_an_earlier_question_is_not_taken_for_a_model_number(bu
 def test_two_motors_with_one_id_are_named(bus, hand):
     bus.motors.twice = {5}
     hand.connect()
-    assert "motor 5 ('press' of middle) does not answer" in fault_of(hand)
+    assert re.search(r"motor 5 \('press' of middle\) answers with data that .* two motors have this id", fault_of(hand))
+
+
+def test_an_adapter_as_it_is_delivered_is_reported_as_too_slow(bus, hand):
+    hand.connect()
+    assert hand.warning() == ''
+    bus.latency_s = 0.016
+    until(lambda: 'of 80 cycles a second: set the latency timer of the USB adapter to 1 ms' in hand.warning())
+    until(lambda: fault_of(hand) == '')
 
 
 def test_firmware_whose_watchdog_is_known_not_to_stop_the_motor_is_reported(bus, hand):

@@ -363,10 +363,9 @@ def test_the_force_is_kept_from_a_thirtieth_of_the_declared_stiffness_on(stiffne
     robot = Robot(TwistControllerParams(**emulated, jitter_s=0.002), **declared, max_impact_n=0.5).connect()
     request = ExplorationRequest('linear_slide', speed_m_s=0.02, force_n=1.0, distance_m=0.03)
     outcome = robot.explore(request, touch=TouchParams(approach_stiffness_n_m=20000.0))
-    too_soft = stiffness_n_m == 600.0 and outcome.message.startswith('waited 10.0 s for the force to settle')
-    assert outcome.success or too_soft, outcome.message
+    assert outcome.success, outcome.message
     assert max(map(max, robot.forces.values())) < 1.2
-    slide_n = np.array(robot.forces.get('slide', [1.0]))
+    slide_n = np.array(robot.forces['slide'])
     assert np.sqrt(np.mean((slide_n - 1.0) ** 2)) < 0.1  # the tolerance with which a slide begins
 
 

@@ -77,7 +77,8 @@ class Explorer:
         self._lift_first, self.lifted, self._zero_n = True, False, None
         self.arm.close()
         self.arm.connect()
-        self._refuses = ''
+        if self._refuses == NO_CONTROL:  # one that is shut down stays so
+            self._refuses = ''
         # After a fault the finger may hang anywhere; the first place is the one that the operator chose.
         self._home = self._home or self.arm.state().position
         return self._home

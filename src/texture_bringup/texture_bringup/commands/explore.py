@@ -427,7 +427,9 @@ def _configure_check(parser: argparse.ArgumentParser) -> None:
 def _check(options: argparse.Namespace) -> int:
     """Check, store or adapt; return 1 if the finger is not as trained and was not corrected."""
     if options.today or options.trained:
-        print(adapt_to_today(options.model, options.trained or (), options.today or ()))
+        if not (options.today and options.trained):
+            raise InvalidParameter('--today and --trained need each other: slides of today, and those of the training')
+        print(adapt_to_today(options.model, options.trained, options.today))
         return 0
     # Report what is missing before the robot moves.
     topics = load_model(options.model).recipe.feature_set.topics

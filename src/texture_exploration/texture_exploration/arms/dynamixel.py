@@ -14,7 +14,9 @@ import sys
 import termios
 import threading
 import time
+from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import serial
@@ -59,6 +61,7 @@ FIRMWARE = 6  # address of its version, of one byte, in all control tables of pr
 TRIPPED = 0xFF  # the register of the Bus Watchdog after it has stopped the motor
 RESTART_S = 3.0  # a motor has rebooted within
 SILENT = 'does not answer'
+GARBLED = 'answers with data that cannot be read: do two motors have this id, or is the cable damaged?'
 RESET = 'has lost its torque: it was reset, for example by a voltage drop'
 REMEDY = "; when it has cooled and nothing blocks it, reboot it (service '~/reboot') or switch its power off and on"
 HARDWARE_ERRORS = {0: 'input voltage', 2: 'overheating', 3: 'encoder', 4: 'electrical shock', 5: 'overload'}
@@ -101,7 +104,7 @@ class DynamixelBus:
         self.missing: set[int] = set()
         self.limits_a: dict[int, float] = {}
         self.deaf: set[int] = set()  # motors whose watchdog may not stop them
-        self._reset: set[int] = set()  # motors that are missing as they have lost their torque
+        self._reasons: dict[int, str] = {}  # why a motor is missing, unless it is silent
         self._energised: set[int] = set()
         self._goal_currents: dict[int, int] = {}  # as sent last
         self._device = device
@@ -152,11 +155,11 @@ class DynamixelBus:
             self.write(motor, 'torque_enable', 1)
             self._energised.add(motor)
             self.missing.discard(motor)
-            self._reset.discard(motor)
+            self._reasons.pop(motor, None)
 
     def why_missing(self, motor: int) -> str:
         """Return why a motor is missing, as text."""
-        return f'{self._profile.owner(motor)} {RESET if motor in self._reset else SILENT}'
+        return f'{self._profile.owner(motor)} {self._reasons.get(motor, SILENT)}'
 
     def _prepare(self, motor: int) -> bool:
         """Set mode, limits and goals of a motor without torque; return whether it answers."""
@@ -164,6 +167,8 @@ class DynamixelBus:
         model, result = self._ping(motor)
         position = self.read_register(motor, 'present_position') if result == SUCCESS else None
         if position is None:
+            if result == self._sdk.COMM_RX_CORRUPT:
+                self._reasons[motor] = GARBLED
             return False
         if model != profile.model:  # or it is a late answer to an earlier request
             model, result = self._ping(motor)
@@ -305,7 +310,7 @@ class DynamixelBus:
                 'computer or the bus was delayed; all motors were released'
             )
         if not value('torque_enable') or (watchdog and value('bus_watchdog') != watchdog):
-            self._reset.add(motor)
+            self._reasons[motor] = RESET
             self._energised.discard(motor)
             self.missing.add(motor)
         elif value('goal_current') != self._goal_currents[motor]:
@@ -453,6 +458,8 @@ CLOSING_M_S = 0.02  # speed of a finger that comes down to press
 REACH_RAD = 0.3  # largest depth of the goal of a pressing motor within the object
 SLACK_RAD = 0.2  # largest distance between the goal and a blocked motor
 LONGEST_STEP_S = 0.05
+RATE_CYCLES = 40  # over which the rate is measured
+SLOW_FRACTION = 0.7  # of the rate of the profile, below which a warning is given
 LIMITS = CommandLimits()
 NOT_CONNECTED = 'the hand is not connected; connect it first'
 
@@ -474,7 +481,7 @@ class DynamixelHand:
         self._fingers = {name: DynamixelFinger(joints, self.profile) for name, joints in self.profile.fingers.items()}
         self._state: HandState | None = None
         self._failure = NOT_CONNECTED
-        self._doubt = ''
+        self._doubt = self._slow = ''
         self._highest_a: Mapping[int, float] = {}
         self._grip: Mapping[str, float] = {}
         self._commands: dict[str, tuple[ArmCommand, float]] = {}
@@ -487,7 +494,7 @@ class DynamixelHand:
         self.close()
         self._closing.clear()
         self._fresh.clear()
-        self._failure = self._doubt = ''
+        self._failure = self._doubt = self._slow = ''
         self._thread = threading.Thread(target=self._run, name='dynamixel', daemon=True)
         self._thread.start()
         if not self._fresh.wait(FIRST_STATE_S) or self._failure:
@@ -512,7 +519,7 @@ class DynamixelHand:
 
     def warning(self) -> str:
         """Return what is not as it should be although the hand moves, '' if nothing."""
-        return self._doubt
+        return '; '.join(filter(None, (self._doubt, self._slow)))
 
     def grip(self, forces_n: Mapping[str, float]) -> None:
         """Press from the next cycle on."""
@@ -593,6 +600,7 @@ class DynamixelHand:
             finger.restart()
         now_s = stepped_s = time.monotonic()
         errors: dict[str, None] = {}
+        cycles: deque[float] = deque(maxlen=RATE_CYCLES)
         while not self._closing.wait(max(0.0, now_s + period_s - time.monotonic())):
             now_s = time.monotonic()
             motors = bus.read()
@@ -606,6 +614,9 @@ class DynamixelHand:
             stepped_s = now_s
             self._publish(self._fault(bus, errors))
             bus.write_goals(goals)
+            cycles.append(now_s)
+            if len(cycles) == RATE_CYCLES:
+                self._slow = self._slowness((RATE_CYCLES - 1) / (cycles[-1] - cycles[0]))
 
     def _doubtful(self, deaf: Iterable[int]) -> str:
         """Return a warning about motors whose watchdog may not stop them, '' if there are none."""
@@ -615,6 +626,18 @@ class DynamixelHand:
         return (
             f'the watchdog of motors {numbers} may not stop them when the cable is out or the computer hangs: their '
             'firmware is known to go on; update it with DYNAMIXEL Wizard'
+        )
+
+    def _slowness(self, rate_hz: float) -> str:
+        """Return a warning about the rate of the bus, '' if it is fast enough."""
+        if rate_hz >= SLOW_FRACTION * self.profile.rate_hz:
+            return ''
+        latency = Path(f'/sys/class/tty/{Path(self._device).resolve().name}/device/latency_timer')  # adapters by FTDI
+        now = f' (now {latency.read_text().strip()} ms)' if latency.is_file() else ''
+        return (
+            f'the bus makes {rate_hz:.0f} of {self.profile.rate_hz:g} cycles a second: set the latency timer of the '
+            f"USB adapter to 1 ms{now}, raise the baud rate ({self.profile.baud}) or lower 'rate_hz' of the profile "
+            f"'{self.profile.name}'"
         )
 
     def _step(self, motors: Mapping[int, MotorState], dt_s: float, now_s: float) -> dict[int, tuple[float, float]]:
