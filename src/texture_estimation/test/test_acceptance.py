@@ -252,7 +252,9 @@ def test_few_slides_reject_every_surface_and_enough_accept_those_trained_and_har
 
     ends = [(label, estimates_of(many, values, hop_s=0.5)[-1]) for label, values in known]
     assert np.mean([end.accepted and end.label == label for label, end in ends]) > 0.7
-    assert np.mean([estimates_of(many, values, hop_s=0.5)[-1].accepted for _, values in novel]) <= 0.1
+    of_novel = [estimates_of(many, values, hop_s=0.5) for _, values in novel]
+    assert np.mean([estimates[-1].accepted for estimates in of_novel]) <= 0.1
+    assert np.mean([estimate.accepted for estimates in of_novel for estimate in estimates]) <= 0.2
 
 
 def test_added_slides_pass_the_same_acceptance_and_fewer_than_needed_none(make_examples, estimates_of):

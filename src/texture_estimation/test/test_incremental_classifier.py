@@ -233,3 +233,14 @@ def test_an_added_texture_is_reported_but_no_surer_than_its_slides_can_show(mode
     assert max(estimate.confidence for estimate in estimates) <= highest + 1e-9
     reason = 'too few slides for early stopping' if count >= 5 else f"{count} added; to accept 'silk' 5 are needed"
     assert reason in estimates[-1].message
+
+
+@pytest.mark.filterwarnings('ignore:overflow', 'ignore:invalid value')
+def test_an_added_slide_whose_values_overflow_is_refused_with_a_sentence(three_added):
+    _, path = three_added
+    [first, *_] = sorted((path.parent / 'surfaces.added').iterdir())
+    content = json.loads(first.read_text())
+    content['values'][0][0] = 1e300
+    first.write_text(json.dumps(content))
+    with pytest.raises(ModelMismatch, match=r'the added slides of model .* cannot be used: .*; move them away'):
+        load_model(path)

@@ -4,6 +4,7 @@ import dataclasses
 import hashlib
 import io
 import json
+import math
 import resource
 import subprocess
 import sys
@@ -190,6 +191,8 @@ def test_what_was_fitted_for_acceptance_is_the_same_after_it_was_saved(model, tm
         ('rates', {'coverage': 0.9}, 'the entries coverage; max_accepted_wrong'),
         ('slides', True, 'slides is True'),
         ('slides', 12.5, 'slides is 12.5'),
+        ('slides', -1, 'acceptance has -1 slides'),
+        ('decided_score', -math.inf, 'finite ones of'),
         ('added', 3, 'added is 3'),
         ('domain', 'any', "domain is 'any'; the entries motions"),
     ],
@@ -200,6 +203,24 @@ def test_an_acceptance_of_no_such_numbers_is_refused_in_one_sentence(saved, entr
     card['acceptance'][entry] = value
     path.write_text(json.dumps(card))
     refused(saved, f"{sentence}.*; train it again with 'texture train'")
+
+
+@pytest.mark.parametrize(
+    ('name', 'value'),
+    [
+        ('speed_m_s', [0.2, 0.1]),
+        ('force_n', [0.0, math.inf]),
+        ('force_n', [1.0]),
+        ('directions_rad', [math.nan]),
+        ('speed_margin', math.inf),
+    ],
+)
+def test_a_domain_with_an_impossible_range_is_refused(saved, name, value):
+    path = saved.with_suffix('.json')
+    card = json.loads(path.read_text())
+    card['acceptance']['domain'][name] = value
+    path.write_text(json.dumps(card))
+    refused(saved, 'train it again')
 
 
 def test_the_conditions_of_an_added_slide_survive_its_file(tmp_path):

@@ -8,11 +8,11 @@ import sys
 import numpy as np
 import pytest
 import skops.io
-from sklearn.ensemble import ExtraTreesClassifier
+from sklearn.ensemble import ExtraTreesClassifier, RandomForestClassifier
 
 from texture_core.errors import InvalidParameter, MissingLibrary, ModelMismatch
 from texture_estimation.learners.learner import standardisation
-from texture_estimation.learners.sklearn_learner import unpacked
+from texture_estimation.learners.sklearn_learner import SklearnPredictor, unpacked
 from texture_estimation.model import load_model
 from texture_estimation.recipe import Recipe
 from texture_estimation.training import train
@@ -123,3 +123,16 @@ def test_where_skops_is_missing_a_stored_classifier_is_refused_in_one_sentence(t
         MissingLibrary, match="learners of scikit-learn need the library 'skops', which is not installed"
     ):
         load_model(path)
+
+
+@pytest.mark.parametrize('child', [10**6, 0])
+def test_a_tree_that_points_outside_itself_or_back_is_refused_before_it_is_used(child):
+    rng = np.random.default_rng(0)
+    values, codes = rng.normal(size=(40, 3)), np.repeat([0, 1], 20)
+    forest = RandomForestClassifier(n_estimators=2, random_state=0).fit(values + codes[:, None], codes)
+    tree = forest.estimators_[1].tree_
+    state = tree.__getstate__()
+    state['nodes']['left_child'][0] = child
+    tree.__setstate__(state)
+    with pytest.raises(ModelMismatch, match='points outside its nodes or features'):
+        SklearnPredictor(forest, np.zeros(3), np.ones(3), 2, 1.0)

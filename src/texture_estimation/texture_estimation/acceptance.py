@@ -24,6 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from texture_core.errors import InvalidData
 from texture_core.types import Array, Rejection
 from texture_estimation.domain import Domain
 from texture_estimation.evidence_rules import EvidenceRule
@@ -298,6 +299,17 @@ class Acceptance:
     decided_score: float = NEVER
     distance: ClassDistance | None = None
     added: str = ''
+
+    def __post_init__(self) -> None:
+        if self.slides < 0:
+            raise InvalidData(f'acceptance has {self.slides} slides; 0 or more are possible')
+        shape, reach = (len(LEVELS) if self.distance else 0, len(Limits._fields)), Limits._fields.index('reach')
+        if (
+            self.levels.shape != shape
+            or np.isnan(self.levels[:, reach]).any()  # infinite where no place was left out
+            or not np.isfinite([*np.delete(self.levels, reach, axis=1).flat, self.decided_score]).all()
+        ):
+            raise InvalidData(f'acceptance has limits of shape {self.levels.shape}; finite ones of {shape} are needed')
 
     def fitted(
         self, near: Sequence[HeldOutSlide], far: Sequence[HeldOutSlide], rule: EvidenceRule, tempering_exponent: float,

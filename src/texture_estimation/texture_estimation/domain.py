@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from texture_core.errors import InvalidData
 from texture_features.feature_set import RunningConditions, SlideConditions
 from texture_features.windows import Interval
 
@@ -79,6 +80,14 @@ class Domain:
     speed_margin: float = SPEED_MARGIN
     force_margin: float = FORCE_MARGIN
     places: int = 0  # or sessions, of the label that has most; 0 if unknown
+
+    def __post_init__(self) -> None:
+        margins = ((0.0, margin) for margin in (self.speed_margin, self.force_margin))
+        for interval in (self.speed_m_s, self.force_n, *self.levels.values(), *margins):
+            if interval is not None and not 0.0 <= interval[0] <= interval[1] < math.inf:
+                raise InvalidData(f'a range of a domain is {interval}; two rising numbers from 0 on are needed')
+        if not np.isfinite(self.directions_rad).all():
+            raise InvalidData(f'the directions of a domain are {self.directions_rad}; finite ones are needed')
 
     @classmethod
     def of_slides(

@@ -185,6 +185,11 @@ class SlideGaussians:
         probabilities[..., self.added] += proba[..., self.n_trained :]
         return probabilities
 
+    def check(self, mean: Array) -> None:
+        """Raise ValueError unless a slide with this mean, (n_features,), has finite probabilities at every length."""
+        if not all(np.isfinite(self.log_proba(mean, np.zeros_like(mean), length)).all() for length in self.lengths):
+            raise ValueError('its values are too large to be features')
+
     def _described(self, values: Array, hop_ratio: float) -> list[Array]:
         """Return the descriptor of the start of a slide of each length; the last one is of the whole slide."""
         ends = [*(window_count(length, hop_ratio) for length in self.lengths[:-1]), len(values)]

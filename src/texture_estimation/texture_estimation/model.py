@@ -581,6 +581,8 @@ class TextureModel(StoredModel):
             distance.add(self.compared(nothing), 1.0)
             self.acceptance.assess(0.0, distance.to(0), 1.0)
             self.acceptance.members(np.exp(answer), 1.0)
+        if self.slide_gaussians is not None:
+            self.slide_gaussians.check(nothing)
         if not 0.0 <= self.tempering_exponent <= 1.0:
             raise ModelMismatch(f'the exponent of its evidence is {self.tempering_exponent}; allowed is 0 to 1')
 

@@ -17,6 +17,7 @@ from geometry_msgs.msg import PoseStamped
 from texture_core.ros import to_ns
 from texture_core.ros_testing import LocalGraph
 from texture_core.types import FingerReceiver, FingerState
+from texture_simulation.nodes import twist_controller
 from texture_simulation.nodes.leap_hand import LeapHandNode
 from texture_simulation.nodes.rails import RailsNode
 from texture_simulation.nodes.twist_controller import TwistControllerNode
@@ -67,14 +68,14 @@ def test_the_controller_lives_and_ends_with_its_node_which_reports_if_it_dies(gr
 
 def test_a_pose_is_that_of_its_stamp_on_a_machine_that_pauses(graph, monkeypatch):
     node = graph.add(TwistControllerNode, command_timeout_s=0.0)
-    pauses, clock = itertools.cycle([0.0, 0.0, 0.0, 0.03]), node.get_clock()
+    pauses = itertools.cycle([0.0, 0.0, 0.0, 0.03])
 
-    def now():
-        found = clock.now()
+    def time_ns():
+        found = time.time_ns()
         time.sleep(next(pauses))
         return found
 
-    monkeypatch.setattr(node, 'get_clock', lambda: SimpleNamespace(now=now))
+    monkeypatch.setattr(twist_controller, 'time', SimpleNamespace(**{**vars(time), 'time_ns': time_ns}))
     poses = graph.listen(PoseStamped, 'tcp_pose_broadcaster/pose')
     with node._lock:
         node._arm.command(time.monotonic_ns(), np.array([0.05, 0.0, 0.0]))

@@ -134,6 +134,8 @@ def test_a_life_from_configuring_to_cleaning_up(graph: LocalGraph, tmp_path: Pat
     with Rig(name, tmp_path / name) as rig:
         node = graph.add(SensorNode, sensor=name, device=str(rig.link), config=rig.case.config, autostart=False)
         batches = graph.listen(msg.TactileSignal, rig.case.topic, SENSOR_QOS)
+        reports = graph.listen(DiagnosticArray, '/diagnostics')
+        graph.until(lambda: reports and reports[-1].status[0].message == 'the sensor is not active')
         for _ in range(turns):
             assert node.trigger_configure() == TransitionCallbackReturn.SUCCESS
             for _ in range(turns):

@@ -7,7 +7,7 @@ from __future__ import annotations
 import importlib
 import io
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -32,7 +32,7 @@ from texture_estimation.learners.learner import (
 
 SKOPS = ('skops.io', 'learners of scikit-learn', 'models')
 MAX_PACKED_BYTES = 300 * MB  # to which the bytes may unpack
-# What an estimator holds next to estimators, arrays and plain values.
+# What an estimator holds next to estimators, arrays and plain values. Trees are checked before they are used.
 PARTS = (
     'sklearn.calibration._CalibratedClassifier',
     'sklearn.neural_network._stochastic_optimizers.AdamOptimizer',
@@ -95,6 +95,10 @@ class SklearnPredictor:
     n_labels: int
     temperature: float = 1.0
 
+    def __post_init__(self) -> None:
+        for tree in _trees(self.estimator, 0):
+            _check_tree(tree, len(self.mean))
+
     def __call__(self, X: Array) -> Array:
         """Return log-probabilities, (..., n_labels) of (..., n_features)."""
         rows = ((X - self.mean) / self.scale).reshape(-1, len(self.mean))
@@ -108,6 +112,31 @@ class SklearnPredictor:
             return np.log((1.0 - FLOOR) * probabilities + FLOOR / self.n_labels)
         decisions = np.asarray(self.estimator.decision_function(rows), dtype=np.float64)
         return np.stack((-decisions, decisions), axis=-1) if decisions.ndim == 1 else decisions
+
+
+def _trees(value: Any, depth: int) -> Iterator[Any]:
+    """Yield the trees in an estimator."""
+    if depth > 6:
+        return
+    if type(value).__name__ == 'Tree':
+        yield value
+    elif isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.dtype == object):
+        for item in np.ravel(np.array(value, dtype=object)) if isinstance(value, np.ndarray) else value:
+            yield from _trees(item, depth + 1)
+    elif hasattr(value, '__dict__'):
+        for item in vars(value).values():
+            yield from _trees(item, depth + 1)
+
+
+def _check_tree(tree: Any, n_features: int) -> None:
+    """Raise ModelMismatch at a tree that points outside its arrays: scikit-learn does not check, and would crash."""
+    left, right, feature = tree.children_left, tree.children_right, tree.feature
+    index = np.arange(len(left))
+    leaf = left == -1
+    inside = (left > index) & (right > index) & (left < len(left)) & (right < len(left))
+    fits = (feature >= 0) & (feature < n_features)
+    if not len(left) or not np.all(np.where(leaf, right == -1, inside & fits)):
+        raise ModelMismatch('a tree in it points outside its nodes or features')
 
 
 # --------------------

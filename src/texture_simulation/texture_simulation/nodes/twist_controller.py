@@ -24,6 +24,7 @@ from texture_simulation.devices.twist_controller import TOOL_DOWN, EmulatedTwist
 
 COMMANDED_S = 0.3  # commands to a moving arm come more often
 LONGEST_LIFT_S = 6.0  # shorter than a launcher waits before it kills
+READINGS, APART_NS = 5, 1_000_000  # how often the clocks are read until they are of one moment
 
 
 @dataclass(frozen=True)
@@ -126,7 +127,7 @@ class TwistControllerNode(Node):
 
     def _publish(self) -> None:
         with self._lock:
-            stamp_ns, now_ns = time.time_ns(), time.monotonic_ns()  # adjacent: a pause between them is a wrong speed
+            stamp_ns, now_ns = _both_clocks()
             self._arm.advance(now_ns)
             position, reading, finger = self._arm.position, self._arm.reading_n(), self._arm.finger()
             true_n = self._arm.force_n
@@ -147,6 +148,15 @@ class TwistControllerNode(Node):
         if not self._thread.is_alive():
             return 'ERROR', 'the emulated arm ended; see the log and start the node again', numbers
         return 'OK', 'the emulated arm runs', numbers
+
+
+def _both_clocks() -> tuple[int, int]:
+    """Return the time of day and the monotonic time of one moment, ns: a pause between them would be a wrong speed."""
+    for _ in range(READINGS):
+        before_ns, stamp_ns, now_ns = time.monotonic_ns(), time.time_ns(), time.monotonic_ns()
+        if now_ns - before_ns <= APART_NS:
+            break
+    return stamp_ns, now_ns
 
 
 def _pose(stamp: Any, frame_id: str, position: list[float]) -> PoseStamped:
