@@ -244,8 +244,8 @@ class FoldResult:
 
     name: str
     trained_on: tuple[str, ...]
-    results: Mapping[str, SlideResult]
-    model: TextureModel
+    results: Mapping[str, SlideResult] = field(repr=False)  # arrays that would flood a terminal
+    model: TextureModel = field(repr=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -529,6 +529,10 @@ def split_slides(
     Where parts of one slide would be in training and test, a split becomes two, each trained on every other slide of
     a surface and tests on those between.
     """
+    if not hasattr(splitter, 'split') or isinstance(splitter, str):
+        raise InvalidData(
+            f'the splitter is {splitter!r}; give one of scikit-learn, such as StratifiedKFold(5); texts are for commands'
+        )
     labels, columns = dataset.labels, slide_groups(dataset, groups)
     if type(splitter).__name__.startswith('Stratified'):
         _check_folds(labels, getattr(splitter, 'n_splits', 1))
