@@ -20,10 +20,21 @@ from typing import Any
 import numpy as np
 
 from texture_core.cli import progress
+from texture_core.config import parse_yaml
 from texture_core.errors import InvalidData
 from texture_core.types import NANOSECONDS, AnyArray, Array, ExplorationState, Phase, TactileSignal, checked_label
 from texture_recordings.bags import DELAY_NS, PAUSE_NS, START_NS, BagWriter, is_bag, is_cut_off, slide_batches
-from texture_recordings.clock import MAX_LEFT_OUT, SAME_RATE, ClockFault, estimated, forward, on_grid, with_malformed
+from texture_recordings.clock import (
+    MAX_LEFT_OUT,
+    SAME_RATE,
+    ClockFault,
+    estimated,
+    forward,
+    jumps_back,
+    on_grid,
+    once,
+    with_malformed,
+)
 from texture_recordings.mapping import (
     CONDITION_COLUMNS,
     CONDITION_UNITS,
@@ -389,6 +400,11 @@ class FrameSlides:
                         self._reference.clock, self._reference.rows[start], f'time goes back to {times[start]:.9g} s, '
                         f'into the run that began at {times[before]:.9g} s; save each row once, and each run as a file',
                     )  # fmt: skip
+            for before, stop in pairwise([0, *starts.tolist(), count]):  # shorter jumps back, as where runs overlap
+                part = times[before:stop]
+                if (np.diff(part) < 0).any():
+                    rows = before + once(part, self._reference.samples[before:stop])
+                    starts = np.union1d(starts, rows[jumps_back(times[rows])])
         spans = [slice(first, last) for first, last in pairwise([0, *starts.tolist(), count])]
         if wanted is not None:
             spans = [one for one in spans if _is_one_of(wanted[one.start], params.values or ['?*'])]
