@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Inputs that somebody could have, one table for each kind: the true samples, or a refusal that says what is wrong."""
 
+import io
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -9,13 +10,15 @@ from typing import Any
 
 import h5py
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 import scipy.io
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_types_from_msg
 
 from texture_core.errors import InvalidData
-from texture_recordings.bags import message_types
+from texture_recordings.bags import CheckedPath, message_types
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.mapping import mapping_from
 from texture_recordings.readers import MAPPED
@@ -86,6 +89,7 @@ CORK: Truth = [('cork', X)]
 LOST = np.isin(np.arange(N), [100, 101, 260, 433])
 HOLED = np.where(LOST, np.nan, X)
 UNEVEN = np.floor(T * 41.7) / 41.7  # of a buffer that is read 41.7 times a second, with two or three rows
+OVERLAP = np.r_[T[:300], 2.7 + T[:300]].round(2)
 PAUSE = {'slides': {'by': 'pause', 'min_s': 0.05}}
 BACK = r"row \d+, column 't': time goes back .*by: pause"
 CLOCKS: dict[str, tuple[Write, dict, Truth]] = {
@@ -149,6 +153,12 @@ CLOCKS: dict[str, tuple[Write, dict, Truth]] = {
         csv(np.r_[T[:300], T[200:]], np.r_[X[:300], X[200:]]), {'slides': {'by': 'pause'}},
         'row 302, .*time goes back to 2 s, into the run that began at 0 s; save each row once',
     ),
+    'runs overlap': (csv(OVERLAP, X), {}, 'row 302, .*time goes back from 2.99 to 2.7 s, .*by: pause'),
+    'runs overlap by pause': (csv(OVERLAP, X), PAUSE, [('cork', X[:300]), ('cork', X[300:])]),
+    'a row ahead': (
+        csv(np.where(np.arange(N) == 300, T + 0.05, T).round(2), X), {},
+        [('cork', np.where((T > 2.995) & (T < 3.045), np.nan, X))],
+    ),
 }  # fmt: skip
 
 
@@ -210,6 +220,10 @@ LABELS: dict[str, tuple[Write, dict, Truth]] = {
         )
         for every in (1, 10, 300, N)
     },
+    'a name that contradicts a column': (
+        csv(T, X, ['felt'] * N, names='t,x,material'), {}, "'material' is 'cork' in the name and 'felt' in a column",
+    ),
+    'a name that equals a column': (csv(T, X, [1] * N, names='t,x,run', name='cork_01.csv'), {}, CORK),
     'a list of labels next to the elements': (grouped, PARTS, "no column 'material'"),
 }  # fmt: skip
 
@@ -249,6 +263,19 @@ def alternating(*names: Any) -> Write:
     return csv(np.repeat(T, count), samples, list(names) * N, names='t,x,sensor')
 
 
+def coded_by(name: str, codes: Any) -> Write:
+    return csv(X, codes, names=f'x,{name}')
+
+
+UNUSED: dict[str, Any] = {  # what changes in tables of anybody and is none of sensors, trials or runs
+    'times of the day': [f'2026-03-01T12:00:{int(t):02d}' for t in T],
+    'seconds': (T + 1_700_000_000.4).astype(int),
+    'a contact': np.repeat([0, 1], 300),
+    'a contact as text': np.repeat(['True', 'False'], 300),
+    'fractions': np.repeat([0.5, 1.5], 300),
+    'remarks': np.where(np.arange(N) == 300, 'bump', np.where(np.arange(N) == 400, 'ok', '')),
+    'many texts': [f'{number // 6} %' for number in range(N)],
+}
 ID = "row {}, column 'id': it changes"
 ROWS: dict[str, tuple[Write, dict, Truth]] = {
     **{
@@ -272,6 +299,29 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
     'trials that no key uses': (csv(T, X, np.repeat(range(6), 100), names='t,x,trial'), {}, "'trial': it changes"),
     'other columns': (
         csv(T, X, np.arange(N) % 256, (20 * Y).astype(int), T.astype(str), names='t,x,n,adc,wall'), {}, CORK,
+    ),
+    **{
+        f"'{cell}' in every {every} rows of an unused column": (
+            csv(T, X, np.where(np.arange(N) % every, '1.5', cell), names='t,x,y'), {}, CORK,
+        )
+        for cell, every in (('-', 20), ('--', 11), ('err', 15), ('inf', 20), ('N/A', 9), ('-', 2))
+    },
+    **{
+        f'trials {codes}': (coded_by('trial', np.repeat(codes, N // len(codes))), content, "'trial': it changes")
+        for codes in ((1, 2, 4), (10, 20, 30), (0, 1), (1, 2, 1, 2)) for content in (RATE,)
+    },
+    **{f'column of {name}': (csv(T, X, cells, names='t,x,y'), {}, CORK) for name, cells in UNUSED.items()},
+    'all codes at once': (
+        csv(T, X, np.repeat([21, 22], 300), np.repeat(['a', 'b'], 300), names='t,x,temp [C],state'), {},
+        r"'temp \[C\]': it changes from '21' to '22' within a slide \(state too\).*"
+        r"rows: \{'temp \[C\]': '\*', state: '\*'\}$",
+    ),
+    'a malformed row among those of sensors without times': (
+        text('x,id\n' + lines(np.ravel(np.c_[X, Y]), ['a', 'b'] * N).replace(f'{X[9]},a\n', '?\n')),
+        {**RATE, 'rows': {'id': 'a'}}, 'row 20, .*1 cells, 2 are needed: of a malformed row nobody knows',
+    ),
+    'units above those of sensors without times': (
+        text('x,id\nmm,\n' + lines(np.ravel(np.c_[X, Y]), ['a', 'b'] * N)), {**RATE, 'rows': {'id': 'a'}}, CORK,
     ),
     'an index without a name': (
         csv(range(N), X, names=',x'), {'streams': {'signal': {'columns': ['*'], 'rate_hz': 100.0}}}, CORK,
@@ -357,6 +407,23 @@ def wav(declared: int, sounds: int = 1) -> Write:
     return lambda folder: (folder / 'cork_1.wav').write_bytes(b'RIFF' + struct.pack('<I', len(body)) + body)
 
 
+def h5_with(add: Callable[[h5py.File], object]) -> Write:
+    def write(folder: Path) -> None:
+        with h5py.File(folder / 'cork_1.h5', 'w') as file:
+            file['x'] = X
+            add(file)
+
+    return write
+
+
+def parquet(folder: Path) -> None:
+    count = 9_000_000 // N  # of bytes of each row, in one copy
+    bytes_ = pa.DictionaryArray.from_arrays(np.zeros(N, np.int32), pa.array([bytes(count)], pa.binary()))
+    flags = pa.array([None if row % 7 == 0 else row > 300 for row in range(N)])
+    table = pa.table({'x': X, 'contact': flags, 'list': pa.array([[1.0, 2.0]] * N), 'raw': bytes_})
+    pq.write_table(table, folder / 'cork_1.parquet', store_schema=False)
+
+
 SOUND = {**ANY, 'streams': {'signal': {'columns': ['*']}}}
 CONTAINERS: dict[str, tuple[Write, dict, Truth]] = {
     'records of arrays': (
@@ -375,6 +442,18 @@ CONTAINERS: dict[str, tuple[Write, dict, Truth]] = {
         npz(X=np.random.default_rng(0).normal(size=(3000, 5, 2))),
         {**ANY, 'streams': {'signal': {'columns': ['X.*'], 'rate_hz': 100.0}}}, "column 'trial': it changes from '0'",
     ),
+    **{
+        f'unused {name}': (write, {**ANY, **RATE}, CORK)
+        for name, write in {
+            'array of four dimensions': npz(x=X, img=np.ones((3, 2, 2, 2))),
+            'complex numbers': npz(x=X, z=X * 1j),
+            'dates': npz(x=X, d=np.full(N, np.datetime64('2026-03-01'))),
+            'lists in HDF5': h5_with(lambda file: file.create_dataset('z', (N,), h5py.vlen_dtype('f8'))),
+            'nothing in HDF5': h5_with(lambda file: file.create_dataset('z', data=h5py.Empty('f8'))),
+            'complex numbers in HDF5': h5_with(lambda file: file.create_dataset('z', data=X * 1j)),
+            'columns of Parquet': parquet,
+        }.items()
+    },
     'a folder': (both(csv(T, X), lambda folder: (folder / 'felt_1.csv').mkdir()), {}, "'felt_1.csv' is a folder"),
 }  # fmt: skip
 
@@ -668,3 +747,54 @@ def test_custom_messages_are_read_by_the_definition_in_the_bag_however_it_was_le
         report = run(tmp_path / name, ('bag',), streams={'signal': stream}, **where)
         assert report.streams['cork', 'signal']['samples'] == 400, name
         assert bool(report.left_out['bags were cut off, and end with their last whole part']) is (name == 'cut')
+
+
+@pytest.mark.parametrize(
+    ('name', 'cells', 'unit', 'mean'),
+    [
+        ('direction', np.tile([359.9, 0.1, 0.2], 200), 'deg', 0.001),
+        ('speed', np.repeat([0.05, -0.05], 300), 'm/s', 0.05),
+        ('force', np.repeat([-2.0], N), 'N', 2.0),
+    ],
+)
+def test_means_of_conditions_are_those_of_angles_and_magnitudes(
+    tmp_path: Path, name: str, cells: np.ndarray, unit: str, mean: float
+) -> None:
+    csv(T, X, cells, names='t,x,c')(tmp_path)
+    time = {'signal': {'columns': ['x'], 'time': {'column': 't'}}}
+    run(tmp_path, streams=time, conditions={name: {'column': 'c', 'unit': unit}})
+    [value] = SlideDataset.from_bags([tmp_path / 'bags']).condition(name)
+    assert np.sin(value - mean) == pytest.approx(0.0, abs=5e-3)
+
+
+def test_of_a_bag_only_what_the_mapping_means_counts(tmp_path: Path) -> None:
+    kind, store = 'sensor_msgs/msg/Imu', STORE
+    value = store.types[kind]
+    header, time, vector, quaternion = (store.types[one] for one in (
+        'std_msgs/msg/Header', 'builtin_interfaces/msg/Time', 'geometry_msgs/msg/Vector3',
+        'geometry_msgs/msg/Quaternion',
+    ))  # fmt: skip
+    count, none = 24_000, np.zeros(9)  # a minute
+    with Writer(tmp_path / 'cork_1', version=8, storage_plugin=StoragePlugin.MCAP) as writer:
+        connection = writer.add_connection('/imu', kind, typestore=store)
+        for row in range(count):
+            at_ns = START_NS + row * 2_500_000
+            stamp = header(stamp=time(sec=at_ns // 10**9, nanosec=at_ns % 10**9), frame_id='a')
+            rest, still = quaternion(x=0.0, y=0.0, z=0.0, w=1.0), vector(x=0.0, y=0.0, z=0.0)
+            touched = vector(x=float(X[row % N]), y=0.0, z=0.0)
+            message = value(header=stamp, orientation=rest, orientation_covariance=none, angular_velocity=still,
+                            angular_velocity_covariance=none, linear_acceleration=touched,
+                            linear_acceleration_covariance=none)  # fmt: skip
+            writer.write(connection, at_ns, store.serialize_cdr(message, kind))
+    streams = {'signal': {'columns': ['/imu/linear_acceleration.*']}}
+    report = run(tmp_path, MAPPED['bag'], files='{material}_{run}', streams=streams)
+    assert report.streams['cork', 'signal']['samples'] == count
+
+
+def test_a_cut_bag_is_not_loaded_whole(tmp_path: Path) -> None:
+    bag()(tmp_path)
+    path = tmp_path / 'a_1' / 'a_1.mcap'
+    path.write_bytes(path.read_bytes()[:-100])
+    with CheckedPath(path).open() as opened:
+        assert not isinstance(opened, io.BytesIO)
+        assert opened.read(8) == path.read_bytes()[:8]

@@ -136,11 +136,42 @@ class CheckedPath(type(Path())):  # type: ignore[misc]
         if whole:
             return file
         logging.getLogger(__name__).warning("'%s' was cut off; it is read up to its last whole chunk", self)
-        return io.BytesIO(file.read(end) + END)
+        return io.BufferedReader(_Ended(file, end))
 
     def read_text(self, encoding: str | None = None, errors: str | None = None) -> str:
         """Return the text of a short file."""
         return read_text(self, MAX_METADATA_BYTES, encoding or 'utf-8')
+
+
+class _Ended(io.RawIOBase):
+    """The first bytes of a file, and the end that it lacks."""
+
+    def __init__(self, file: BinaryIO, length: int) -> None:
+        self._file, self._length, self._at = file, length, 0
+
+    def readable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        self._at = offset + {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: self._length + len(END)}[whence]
+        return self._at
+
+    def readinto(self, buffer: Any) -> int:
+        if self._at < self._length:
+            self._file.seek(self._at)
+            part = self._file.read(min(len(buffer), self._length - self._at))
+        else:
+            part = END[self._at - self._length :][: len(buffer)]
+        buffer[: len(part)] = part
+        self._at += len(part)
+        return len(part)
+
+    def close(self) -> None:
+        self._file.close()
+        super().close()
 
 
 def _has_end(file: BinaryIO) -> bool:

@@ -25,6 +25,7 @@ PERIODS = (*(2.0**bits * unit for bits in (16, 24, 31, 32) for unit in (1e-9, 1e
 SHORTEST_PERIOD_S = 1.0
 MINUTE_AND_HOUR = (60.0, 3600.0)
 SAME_RATE = 1.05  # the rate of another file may differ by this factor
+IN_DISORDER = 2  # consecutive rows at most
 MAX_LEFT_OUT = 0.1  # share of the rows
 WITHOUT_TIME = 'if no sample is lost, give `rate_hz` in place of the column of time'
 
@@ -97,6 +98,24 @@ def estimated(steps: Array) -> tuple[float, float]:
     return simple if near else float(f'{rate_hz:.{SIGNIFICANT}g}'), burst_s
 
 
+def jumps_back(times: Array) -> AnyArray:
+    """Return the rows, (n,), at which another run begins within the times of the one before.
+
+    More than two rows are behind the newest there, and as many ahead of them: fewer are rows out of order.
+    """
+    behind = times < np.maximum.accumulate(times)
+    ahead = times > np.minimum.accumulate(times[::-1])[::-1]
+    starts = np.flatnonzero(behind & ~np.append(False, behind[:-1]))
+    return np.array([row for row in starts.tolist() if row > IN_DISORDER and ahead[row - IN_DISORDER - 1 : row].all()
+                     and behind[row : row + IN_DISORDER + 1].sum() > IN_DISORDER], dtype=np.intp)  # fmt: skip
+
+
+def once(times: Array, samples: AnyArray) -> AnyArray:
+    """Return the rows, (n,), without those that are there once more."""
+    _, first = np.unique(np.column_stack([times, samples]), axis=0, return_index=True, equal_nan=True)
+    return np.sort(first)
+
+
 def on_grid(
     samples: AnyArray, times: Array, rate_hz: float, burst_s: float = 0.0, *, stated: bool = False
 ) -> tuple[AnyArray, AnyArray, Counter[str]]:
@@ -109,16 +128,17 @@ def on_grid(
     rows: AnyArray = np.arange(count)
     # Rows that are there once more are none; those of a buffer have one time, and may have one value.
     if not burst_s and (steps <= 0).any():
-        _, first = np.unique(np.column_stack([times, samples]), axis=0, return_index=True, equal_nan=True)
-        rows = np.sort(first)
+        rows = once(times, samples)
         left['repeated rows'] = count - len(rows)
     # Of rows that contradict each other by their times nobody knows which one is wrong.
     behind = times[rows] < np.maximum.accumulate(times[rows])
     ahead = times[rows] > np.minimum.accumulate(times[rows][::-1])[::-1]
-    out = left['rows out of order'] = int((behind | ahead).sum())
+    out, jumps = int((behind | ahead).sum()), jumps_back(times[rows])
+    left['rows out of order'] = out
+    first_back = rows[jumps[0]] if len(jumps) else int(np.argmax(steps < 0)) + 1
     rows = rows[~behind & ~ahead]
-    if out > MAX_LEFT_OUT * count or (out and burst_s):
-        row = int(np.argmax(steps < 0)) + 1
+    if out > MAX_LEFT_OUT * count or (out and burst_s) or len(jumps):
+        row = int(first_back)
         bursts = ', which come in bursts,' if burst_s else ''
         raise ClockFault(
             row, f'time goes back from {times[row - 1]:.9g} to {times[row]:.9g} s, and {out} of {count} rows{bursts} '

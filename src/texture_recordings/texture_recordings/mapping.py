@@ -144,7 +144,7 @@ class SlideBorders:
     by: str = param(
         'file',
         "Says what ends a slide: 'file' (each file or table is one slide), 'column' (a value changes), 'pause' (time "
-        "jumps by `pause_s`, also back) or 'row' (each row is one, see `samples_per_row`).",
+        "jumps by `pause_s`, or back) or 'row' (each row is one, see `samples_per_row`).",
         choices=BORDERS,
     )
     column: str = param('', "Names the column whose value changes between slides, for 'column'.")

@@ -12,10 +12,10 @@ import math
 import re
 import struct
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from itertools import chain, islice
+from itertools import chain, islice, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -142,6 +142,8 @@ DELIMITERS = (',', ';', '\t', '|', ' ')
 BLOCK_ROWS = 20_000  # which are parsed at once
 NO_TEXT = frozenset(('nan', 'na', 'n/a', '#n/a', 'null'))  # 'none' may be a label
 BLANK = frozenset(('', 'nan', 'na', 'null', 'none'))
+NO_WORD = NO_TEXT | BLANK | {'inf', '-inf', '+inf'}
+WORD = re.compile(r'[^\W\d_]')
 THOUSANDS = re.compile(r'[+-]?[1-9]\d{0,2}(,\d{3})+')
 NUMERIC = 0.9  # share of numbers in a column of numbers
 
@@ -149,11 +151,12 @@ NUMERIC = 0.9  # share of numbers in a column of numbers
 def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:
     """Yield the columns of a text file: numbers where the mapping wants them or nine of ten cells are some, or texts.
 
-    A row is malformed if it has other cells than the first one, or a text in a column of numbers, used or not.
+    A row is malformed if it has other cells than the first one, or a text in a column whose numbers the mapping uses;
+    above the samples and below them also if it has a word in another column of numbers, as rows of units and means do.
     """
-    form, lines, parts = mapping.format, [], []
-    junk: list[AnyArray] = []
-    reasons: list[str] = []
+    form, parts = mapping.format, list[dict[str, AnyArray]]()
+    lines, junk, reasons = list[AnyArray](), list[AnyArray](), list[str]()
+    words: dict[str, int] = {}  # in unused columns of numbers: the row of one that is there once, -1 of another
     with open_regular(path) as opened:
         # The names of the columns, and those that the mapping wants as numbers.
         rest = _lines(opened, form)
@@ -182,8 +185,10 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
                     values = np.array([number_of(cell) for cell in points])
                     text |= not numeric.setdefault(name, name in numbers or np.isfinite(values).mean() > NUMERIC)
                 for row in np.flatnonzero(np.isnan(values)).tolist() if numeric.get(name) else ():
-                    if cells[row].lower() not in BLANK:
+                    if name in numbers and cells[row].lower() not in BLANK:
                         bad.setdefault(row, _reason(name, cells[row], form))
+                    elif WORD.search(cells[row]) and cells[row].lower() not in NO_WORD:
+                        words[cells[row]] = -1 if cells[row] in words else BLOCK_ROWS * len(parts) + row
                 if not text:
                     _refuse_commas(name, cells, form, delimiter)
                 part[name] = _texts(cells) if text else values
@@ -200,13 +205,25 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
     if not parts:
         raise InvalidData('it has no rows below the names of its columns; choose files with samples')
     columns = {name: np.concatenate([part[name] for part in parts]) for name in names}
-    marked = np.concatenate(junk)
+    marked, numbered = np.concatenate(junk), np.concatenate(lines)
+    above, below = _mark_ends(marked, {row: word for word, row in words.items() if row >= 0}, numbered)
+    reasons = [*above, *reasons, *below][:EXAMPLES]
     # A malformed row without a number is none of a sample: no border is seen there.
     floats = [column for column in columns.values() if column.dtype.kind == 'f']
     gone = marked & np.logical_and.reduce([np.isnan(column) for column in floats])
     last = np.maximum.accumulate(np.where(gone, np.argmin(gone), np.arange(len(gone))))
     columns = {name: column[last] if column.dtype.kind == 'O' else column for name, column in columns.items()}
-    yield TableFrame(place, columns, lines=np.concatenate(lines), junk=marked, reasons=reasons)
+    yield TableFrame(place, columns, lines=numbered, junk=marked, reasons=reasons)
+
+
+def _mark_ends(marked: AnyArray, words: Mapping[int, str], lines: AnyArray) -> list[list[str]]:
+    """Mark the rows with a word that are above all others or below them, and return the reasons of each."""
+    reasons = []
+    for order in (range(len(marked)), range(len(marked) - 1, -1, -1)):
+        ends = [row for row in takewhile(lambda row: marked[row] or row in words, order) if not marked[row]]
+        marked[ends] = True
+        reasons.append([f"row {lines[row]}, '{words[row][:40]}' is no number" for row in sorted(ends)])
+    return reasons
 
 
 def _names(cells: Sequence[str], form: FileFormat) -> list[str]:
@@ -364,8 +381,8 @@ def _read_hdf5(
                 for number, one in enumerate(np.asarray(member[()]).ravel(), 1):
                     if one:
                         note(f'{folder}/{number}/{last}' if in_struct else f'{name}/{number}', file[one])
-            else:
-                found[name] = member
+            elif member.shape is not None and (member.dtype.kind != 'O' or h5py.check_string_dtype(member.dtype)):
+                found[name] = member  # no empty one, and no lists
 
         def visit(name: str, member: Any) -> None:
             if isinstance(member, h5py.Dataset) and not name.startswith('#refs#'):
@@ -449,9 +466,11 @@ def _read_parquet(path: Path, place: str, mapping: TableMapping, take: Take) -> 
         file = parquet.ParquetFile(opened, read_dictionary=texts)  # each text once, however many rows have it
         if not file.metadata.num_rows:
             raise InvalidData('it has no rows; choose files with samples')
-        take(file.metadata.num_rows * len(schema))
         columns: dict[str, AnyArray] = {}
-        for name, column in zip(schema.names, file.read(use_threads=False).columns, strict=True):
+        kinds = (types.is_timestamp, types.is_integer, types.is_floating, types.is_boolean, types.is_dictionary)
+        wanted = [one.name for one in schema if one.name in texts or any(is_(one.type) for is_ in kinds)]
+        take(file.metadata.num_rows * len(wanted))
+        for name, column in zip(wanted, file.read(wanted, use_threads=False).columns, strict=True):
             if types.is_dictionary(column.type):
                 one = column.unify_dictionaries().combine_chunks()
                 one = one.chunk(0) if hasattr(one, 'chunk') else one
@@ -459,8 +478,9 @@ def _read_parquet(path: Path, place: str, mapping: TableMapping, take: Take) -> 
                 columns[name] = words[1 + np.asarray(one.indices.fill_null(-1))]
             elif types.is_timestamp(column.type):
                 columns[name] = np.asarray(column.to_numpy()).astype('datetime64[ns]').astype(np.int64)
-            elif types.is_integer(column.type) or types.is_floating(column.type) or types.is_boolean(column.type):
-                columns[name] = np.asarray(column.to_numpy())
+            else:
+                one = np.asarray(column.to_numpy())
+                columns[name] = one.astype(np.float64) if one.dtype == object else one  # with gaps
         yield TableFrame(place, columns)
 
 
@@ -489,7 +509,9 @@ def _frames(
             array = load(name)
             take(array.size * max(1.0, array.dtype.itemsize / 8))
             arrays[column] = _arranged(array, mapping.format)
-        yield TableFrame(within, {**_unfolded(arrays), **{key: np.array(text) for key, text in fields.items()}})
+        yield TableFrame(
+            within, {**_unfolded(arrays, _meant(mapping)), **{key: np.array(text) for key, text in fields.items()}}
+        )
 
 
 def _arranged(array: AnyArray, form: FileFormat) -> AnyArray:
@@ -503,7 +525,7 @@ def _arranged(array: AnyArray, form: FileFormat) -> AnyArray:
     return np.swapaxes(array, -1, -2) if form.transpose and array.ndim > 1 else array
 
 
-def _unfolded(arrays: Mapping[str, AnyArray]) -> dict[str, AnyArray]:
+def _unfolded(arrays: Mapping[str, AnyArray], meant: set[str]) -> dict[str, AnyArray]:
     """Return the columns of arrays, (n,) each, or () where there is one value."""
     columns: dict[str, AnyArray] = {}
     trials = next((array.shape[:2] for array in arrays.values() if array.ndim == 3), None)
@@ -520,6 +542,8 @@ def _unfolded(arrays: Mapping[str, AnyArray]) -> dict[str, AnyArray]:
         elif array.ndim == 1 or (array.ndim == 2 and (1 in array.shape or not array.size)):
             columns[name or '0'] = array.ravel()
         elif array.ndim not in (2, 3) or array.shape[-1] > MAX_CHANNELS:
+            if not _is_meant(_joined(name, '0'), meant):
+                continue
             raise InvalidData(
                 f"'{name}' has the shape {array.shape}; (n_samples, n_channels) is needed, at most "
                 f'{MAX_CHANNELS} channels; see `transpose` under `format`'
@@ -587,7 +611,10 @@ def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
     clock that differs from that of the recorder is corrected by it.
     """
     wanted = {column for stream in mapping.streams.values() for column in stream.columns}
-    topics = {name.rpartition('/')[0] or name for name in (*wanted, *mapping.numbers(), *mapping.texts())}
+    meant = _meant(mapping)
+    topics = {name.rpartition('/')[0] or name for name in meant}
+    kept: dict[str, set[str]] = {}
+    names: dict[str, Any] = {}
     seen: dict[str, Any] = {}
     types: dict[str, Any] = {}
     rows: dict[str, list[dict[str, AnyArray]]] = {}
@@ -607,9 +634,14 @@ def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
             found = _rows_of(value, message.msgtype)
         except Exception as error:
             raise InvalidData(f"message {len(before)} of '{name}' cannot be read: {error}; record it again") from error
-        if before and found.keys() != before[0].keys():
-            other = ', '.join(sorted(found.keys() ^ before[0].keys())[:5])
+        fields = names.setdefault(name, found.keys())
+        if found.keys() != fields:
+            other = ', '.join(sorted(found.keys() ^ fields)[:5])
             raise InvalidData(f"message {len(before)} of '{name}' has other fields than the first: {other}")
+        if name not in kept:  # what the mapping names, and what may be codes
+            of = {part for part in found if _is_meant(f'{name}/{part}', meant)}
+            kept[name] = of | {part for part, one in found.items() if one.dtype.kind != 'f'} if of else {*found}
+        found = {part: one for part, one in found.items() if part in kept[name]}
         take(10 * len(found) + sum(map(len, found.values())))  # small arrays take more than their values
         before.append(found)
         stamp = getattr(getattr(value, 'header', None), 'stamp', None)
@@ -636,6 +668,19 @@ def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
             columns[f'{name}/{part}'] = np.concatenate([one[part] for one in parts])
             clocks[f'{name}/{part}'] = clock
     yield TableFrame(place, columns, clocks=clocks)
+
+
+def _meant(mapping: TableMapping) -> set[str]:
+    columns = (column for stream in mapping.streams.values() for column in stream.columns)
+    return {*columns, *mapping.numbers(), *mapping.texts()}
+
+
+def _is_meant(name: str, patterns: Iterable[str]) -> bool:
+    """Return whether a name, pattern or range of the mapping means a column."""
+    ranges = (RANGE.fullmatch(one) for one in patterns)
+    return any(fnmatch.fnmatchcase(name, one) for one in patterns) or any(
+        one is not None and name.startswith(one[1]) for one in ranges
+    )
 
 
 def _types_of(connection: Any) -> Any:

@@ -20,10 +20,21 @@ from typing import Any
 import numpy as np
 
 from texture_core.cli import progress
+from texture_core.config import parse_yaml
 from texture_core.errors import InvalidData
 from texture_core.types import NANOSECONDS, AnyArray, Array, ExplorationState, Phase, TactileSignal, checked_label
 from texture_recordings.bags import DELAY_NS, PAUSE_NS, START_NS, BagWriter, is_bag, is_cut_off, slide_batches
-from texture_recordings.clock import MAX_LEFT_OUT, SAME_RATE, ClockFault, estimated, forward, on_grid, with_malformed
+from texture_recordings.clock import (
+    MAX_LEFT_OUT,
+    SAME_RATE,
+    ClockFault,
+    estimated,
+    forward,
+    jumps_back,
+    on_grid,
+    once,
+    with_malformed,
+)
 from texture_recordings.mapping import (
     CONDITION_COLUMNS,
     CONDITION_UNITS,
@@ -52,6 +63,13 @@ STATE_S = 0.1  # a state so often where a condition changes along a slide
 SAME_TIME_S = 1e-9
 MAX_NUMBERED = 3  # columns name_1 … name_n beyond this may be samples: the mapping has to tell
 ROWS_A_CODE = 2  # at least, of a column that may name sensors, trials or runs
+CLOCK_TEXT = re.compile(r'[-\d/.T ]*\d{1,2}:\d\d[-+:.,\d ZAPM]*')  # of the day: it changes as time does
+MANY_TEXTS = 50  # different ones are no codes
+FLAGS = [{one, other} for one, other in (('true', 'false'), ('yes', 'no'), ('on', 'off'))]
+CODE_NAME = re.compile(
+    r'(?:sensor|finger|trial|run|rep|repeat|repetition|recording|session|pass|stroke)s?[ _-]?(?:id|no|nr|number)?'
+)
+MAX_NAMED = 20  # sensors, trials or runs, of a column that is named so: more are its samples
 MAX_TURNS, IN_TURN = 100, 0.7  # sensors in turn, and share of rows with the number of as many rows before
 # Lowest and highest mean of a slide that a tactile finger reaches, in SI units.
 PLAUSIBLE: Mapping[str, tuple[float, float]] = {
@@ -141,6 +159,14 @@ def import_tables(
             constants = {name: np.array(text) for name, text in fields.items()}
             for frame in frames(path, place, mapping):
                 with placed(frame.place):
+                    for name in sorted(constants.keys() & frame.columns.keys()):
+                        text, number = fields[name], number_of(fields[name])
+                        has = {*map(str, np.atleast_1d(frame.texts(name)).tolist())} - {'', text}
+                        if other := [one for one in has if number_of(one) != number]:
+                            raise InvalidData(
+                                f"'{name}' is '{text}' in the name and '{min(other)}' in a column; give the field "
+                                'another name in `files`'
+                            )
                     whole = replace(frame, columns={**frame.columns, **constants})
                     for slide in FrameSlides(mapping, whole, report).slides():
                         bags.write(*slide)
@@ -268,8 +294,19 @@ class FrameSlides:
             if not mask.any():
                 has = ', '.join(sorted({*texts.tolist()})[:5])
                 raise InvalidData(f"column '{name}' has no row '{value}'; it has {has}")
-            self._report.leave_out('rows are not those under `rows`', int((~mask).sum()))
+            timed = all(one.time.column for one in self._mapping.streams.values())
+            junk = np.zeros(len(mask), dtype=bool) if frame.junk is None or timed else frame.junk
             lines = np.arange(len(mask)) if frame.lines is None else frame.lines
+            good = np.flatnonzero(~junk)
+            between = np.flatnonzero(np.diff(good) > 1)
+            if len(between):
+                row = f'row {lines[good[between[0]] + 1]}'
+                reason = next((one for one in frame.reasons if one.startswith(f'{row},')), f'{row} is malformed')
+                raise InvalidData(
+                    f'{reason}: of a malformed row nobody knows whether it is one of those under `rows`, so without a '
+                    'column of time the rows behind it may shift; give one, or remove the row'
+                )
+            self._report.leave_out('rows are not those under `rows`', int((~mask).sum()))
             frame = replace(
                 frame, lines=lines[mask], junk=None if frame.junk is None else frame.junk[mask],
                 columns={key: one[mask] if one.shape == mask.shape else one for key, one in frame.columns.items()},
@@ -389,6 +426,11 @@ class FrameSlides:
                         self._reference.clock, self._reference.rows[start], f'time goes back to {times[start]:.9g} s, '
                         f'into the run that began at {times[before]:.9g} s; save each row once, and each run as a file',
                     )  # fmt: skip
+            for before, stop in pairwise([0, *starts.tolist(), count]):  # shorter jumps back, as where runs overlap
+                part = times[before:stop]
+                if (np.diff(part) < 0).any():
+                    rows = before + once(part, self._reference.samples[before:stop])
+                    starts = np.union1d(starts, rows[jumps_back(times[rows])])
         spans = [slice(first, last) for first, last in pairwise([0, *starts.tolist(), count])]
         if wanted is not None:
             spans = [one for one in spans if _is_one_of(wanted[one.start], params.values or ['?*'])]
@@ -400,25 +442,51 @@ class FrameSlides:
     def _refuse_unused_codes(self) -> None:
         """Refuse a slide within which an unused column of texts or codes changes, as of sensors, trials or runs."""
         used = {*self._texts, *self._numbers, *self._mapping.rows}
+        found: dict[str, AnyArray] = {}  # the rows before a change and behind it
         for name, array in self._frame.columns.items():
-            if name in used or not array.ndim or self._group(name) != self._reference.group:
+            plain = array.ndim and array.dtype.kind in 'OUSbiuf'
+            if name in used or not plain or self._group(name) != self._reference.group:
                 continue
-            text = array.dtype.kind in 'OUS'
-            values = self._frame.texts(name) if text else self._frame.numbers(name)
-            count = len(np.unique(values)) if text or not (values % 1.0).any() else 0
-            if not 2 <= count <= len(values) / ROWS_A_CODE:
-                continue
-            for span in self._spans:
+            values = self._codes(name)
+            for span in self._spans if len(values) else ():
                 rows = self._reference.rows[span]
-                rows = rows[values[rows] != ''] if text else rows
-                if row := _mixed(values[rows]):
-                    first, other = self._frame.texts(name)[rows[row - 1 : row + 1]]
-                    raise self._fault(
-                        name, rows[row], f"it changes from '{first}' to '{other}' within a slide and no key uses it: "
-                        f'rows of several sensors, trials or runs may be mixed; choose some by rows: {{{name}: '
-                        f"'{first}'}}, cut there by slides: {{by: column, column: {name}}}, or take all as one signal "
-                        f"by rows: {{{name}: '*'}}"
-                    )  # fmt: skip
+                rows = rows[values[rows] != ''] if values.dtype.kind == 'O' else rows[np.isfinite(values[rows])]
+                if name not in found and (row := _mixed(values[rows], named=_is_code(name))):
+                    found[name] = rows[row - 1 : row + 1]
+        if found:
+            name, rows = next(iter(found.items()))
+            first, other = self._frame.texts(name)[rows]
+            key, also = _key(name), f' ({", ".join(list(found)[1:])} too)' if len(found) > 1 else ''
+            all_of = ', '.join(f"{_key(one)}: '*'" for one in found)
+            raise self._fault(
+                name, rows[1], f"it changes from '{first}' to '{other}' within a slide{also} and no key uses it: rows "
+                f"of several sensors, trials or runs may be mixed; choose some by rows: {{{key}: '{first}'}}, cut "
+                f'there by slides: {{by: column, column: {key}}}, or take all as one signal by rows: '
+                f'{{{all_of}}}'
+            )  # fmt: skip
+
+    def _codes(self, name: str) -> AnyArray:
+        """Return what may be codes of sensors, trials or runs, (n,) texts or numbers; nothing of other columns."""
+        array, named, times = self._frame[name], _is_code(name), self._reference.time_s
+        nothing = np.empty(0)
+        values = self._frame.texts(name) if array.dtype.kind in 'OUSb' else self._frame.numbers(name)
+        if values.dtype.kind == 'O':
+            texts, counts = np.unique(values[values != ''], return_counts=True)
+            numbers = np.array([number_of(one) for one in texts.tolist()])
+            flag = len(texts) <= 2 and {one.lower() for one in texts.tolist()} in FLAGS
+            few = 0 < len(texts) <= counts.sum() / ROWS_A_CODE
+            if not few or CLOCK_TEXT.fullmatch(texts[0]) or (not named and (flag or len(texts) > MANY_TEXTS)):
+                return nothing
+            if np.isnan(numbers).sum() > 1 or np.isnan(numbers).all():
+                return values
+            values = self._frame.numbers(name)  # next to '-' or the like where there is none
+        known = values[np.isfinite(values)]
+        if not 2 <= len(np.unique(known)) <= len(values) / ROWS_A_CODE or (known % 1.0).any():
+            return nothing
+        if times is not None and not named and len(np.unique(known)) > 2:
+            ahead = values[self._reference.rows] - times  # seconds without their parts
+            return nothing if np.nanmax(ahead) - np.nanmin(ahead) <= 1.0 + SAME_TIME_S else values
+        return values
 
     def _rated(self, stream: Stream) -> Stream:
         """Return a stream with the rate of its rows: as stated, else by its times, which must agree."""
@@ -602,7 +670,10 @@ class FrameSlides:
                 raise InvalidData(f"'{quantity.column}' is '{text}' in its name; a number is needed there")
         times, values = times[np.isfinite(values)], values[np.isfinite(values)]
         values = values * CONDITION_UNITS[name].get(quantity.unit, 1.0)
-        negative = name != 'direction' and len(values) and values.mean() < 0
+        if name == 'direction' and len(values):  # 359° next to 1° is 361°
+            values -= math.tau * np.round((values - values[0]) / math.tau)
+        values = np.abs(values) if name == 'speed' else values
+        negative = name == 'force' and len(values) and values.mean() < 0
         return times, -values if negative else values
 
 
@@ -611,13 +682,27 @@ def _is_one_of(text: str, wanted: Sequence[str]) -> bool:
     return any(fnmatch.fnmatchcase(text, one) or text == one for one in wanted)
 
 
-def _mixed(values: AnyArray) -> int:
-    """Return the first row at which texts change, or numbers in turn or blocks of counted ones; 0 if none does."""
+def _is_code(name: str) -> bool:
+    return CODE_NAME.fullmatch(re.split(r'[/.]', name)[-1].strip().lower()) is not None
+
+
+def _key(name: str) -> str:
+    """Return a name as a mapping in YAML needs it."""
+    return name if re.fullmatch(r'[^\W\d][\w/.]+|/[\w/.]+', name) and parse_yaml(name) == name else repr(name)
+
+
+def _mixed(values: AnyArray, *, named: bool) -> int:
+    """Return the first row at which texts change, or numbers in turn or in blocks; 0 if none does.
+
+    In a column that is named as one of codes flags may be in blocks, too, and few others in any order.
+    """
     found, codes = np.unique(values, return_inverse=True)
     changes, count = np.flatnonzero(codes[1:] != codes[:-1]) + 1, len(found)
     if values.dtype.kind != 'O' and len(codes) < ROWS_A_CODE * count:  # a number of rows
         return 0
-    in_blocks = values.dtype.kind == 'O' or len(changes) == count - 1 == np.ptp(found)
+    flags = values.dtype.kind != 'O' and not named and {*found.tolist()} <= {0.0, 1.0}
+    in_blocks = values.dtype.kind == 'O' or (len(changes) == count - 1 and (named or not flags))
+    in_blocks |= named and not flags and count <= MAX_NAMED
     in_turn = (
         count <= MAX_TURNS and len(changes) > 0.5 * len(codes) and (codes[count:] == codes[:-count]).mean() > IN_TURN
     )
