@@ -530,9 +530,7 @@ def split_slides(
     a surface and tests on those between.
     """
     if not hasattr(splitter, 'split') or isinstance(splitter, str):
-        raise InvalidData(
-            f'the splitter is {splitter!r}; give one of scikit-learn, such as StratifiedKFold(5); texts are for commands'
-        )
+        raise InvalidData(f'the splitter is {splitter!r}; give one of scikit-learn, such as StratifiedKFold(5)')
     labels, columns = dataset.labels, slide_groups(dataset, groups)
     if type(splitter).__name__.startswith('Stratified'):
         _check_folds(labels, getattr(splitter, 'n_splits', 1))

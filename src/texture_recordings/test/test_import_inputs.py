@@ -378,6 +378,21 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
 }  # fmt: skip
 
 
+def test_files_at_another_depth_are_named_and_a_pointer_of_git_lfs_is_no_data(tmp_path: Path) -> None:
+    mapping = mapping_from({
+        'files': '{material}_{run}.csv', 'streams': {'signal': {'columns': ['x'], 'time': {'column': 't'}}},
+        'label': {'column': 'material'},
+    })  # fmt: skip
+    (tmp_path / 'deeper').mkdir()
+    for folder in (tmp_path, tmp_path / 'deeper'):
+        csv(T, X)(folder)
+    report = import_tables(mapping, tmp_path, None)
+    assert report.left_out == {'files lie in more or fewer folders than `files` names': 1}
+    text('version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n', 'felt_1.csv')(tmp_path)
+    with pytest.raises(InvalidData, match=r"'felt_1\.csv' is a pointer of Git LFS .* git lfs pull"):
+        import_tables(mapping, tmp_path, None)
+
+
 @pytest.mark.parametrize('name', ROWS)
 def test_rows(tmp_path: Path, name: str) -> None:
     check(tmp_path, *ROWS[name])

@@ -199,7 +199,8 @@ def _places(times: Array, rows: AnyArray, rate_hz: float, out: int, *, stated: b
         row = int(np.abs(lag).argmax())
         raise ClockFault(
             int(rows[row]), f'the rate changes within a slide: by {rate_hz:g} Hz this row is {abs(lag[row]):.3g} '
-            'samples off; cut the slides where it changes, and give each rate a mapping',
+            f'samples off, by rows and duration the rate is {_mean_hz(times):.4g} Hz; cut the slides where it changes, '
+            f'and give each rate a mapping; {WITHOUT_TIME}',
         )  # fmt: skip
     off = np.abs(lag) if missing.any() else _shifts(lag)
     if off.max(initial=0.0) > OFF_GRID:

@@ -116,6 +116,8 @@ def frames(path: Path, place: str, mapping: TableMapping) -> Iterator[TableFrame
                 size = sum(one.stat().st_size for one in path.iterdir() if one.is_file())
             else:
                 with open_regular(path, MAX_FILE_BYTES) as file:
+                    if file.read(len(LFS)) == LFS:
+                        raise InvalidData('it is a pointer of Git LFS and has no data; run: git lfs pull')
                     size = file.seek(0, io.SEEK_END)
             taken, most = 0.0, max(MAX_VALUES, size)
 
@@ -320,6 +322,8 @@ def number_of(cell: str) -> float:
 
 # ---- files of arrays
 
+LFS = b'version https://git-lfs'
+
 
 def _read_numpy(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:
     with open_regular(path) as opened:
@@ -339,7 +343,13 @@ def _read_mat(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
             yield from _read_hdf5(path, place, mapping, take, matlab=True)
             return
         opened.seek(0)
-        take(sum(math.prod(shape) for _, shape, _ in whosmat(opened)))
+        found = whosmat(opened)
+        if opaque := [name for name, shape, _ in found if shape is None]:
+            raise InvalidData(
+                f"'{opaque[0]}' is a table, timetable or object, which only MATLAB reads; save arrays there, such as "
+                "those of table2struct(timetable2table(T), 'ToScalar', true)"
+            )
+        take(sum(math.prod(shape) for _, shape, _ in found))
         opened.seek(0)
         content = loadmat(opened, struct_as_record=True)
     arrays = dict(_members({name: value for name, value in content.items() if not name.startswith('__')}))

@@ -120,6 +120,7 @@ class ImportReport:
             shown = names[0] if len(names) == 1 else f'{len(names)}: {names[0]} … {names[-1]}'
             spread = [_range(self.conditions.get((surface, name), ())) for name in named]
             seconds = f'{counts["samples"] / rate_hz:.1f}'
+            shown = f'1: {shown}' if shown.isdigit() else shown
             table.append([surface, stream, str(self.slides[surface]), seconds, f'{rate_hz:g} Hz', shown,
                           str(counts['lost']), *spread])  # fmt: skip
         widths = [max(map(len, column)) for column in zip(*table, strict=True)]
@@ -190,8 +191,12 @@ def _files(
     """Yield the files that the mapping means, in the order of their names, with these and what they hold."""
     if not source.exists():
         raise InvalidData(f"there is no '{source}'; give the folder that holds the files")
-    whole = source.is_file() or is_bag(source)
-    paths = [source] if whole else sorted(source.glob('/'.join('*' * (mapping.files.count('/') + 1))))
+    whole, depth = source.is_file() or is_bag(source), mapping.files.count('/')
+    paths = [source] if whole else sorted(source.glob('/'.join('*' * (depth + 1))))
+    for path in [] if whole else sorted(source.rglob('*')):
+        place = path.relative_to(source).as_posix()
+        if place.count('/') != depth and path.is_file() and kind_of(path) in kinds and not is_bag(path.parent):
+            report.leave_out('files lie in more or fewer folders than `files` names', 1, f"'{place}'")
     for path in paths:
         place = path.name if whole else path.relative_to(source).as_posix()
         fields = template_fields(mapping.files, place)
