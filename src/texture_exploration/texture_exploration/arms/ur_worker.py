@@ -286,14 +286,15 @@ LOST = 'the connection to the controller was lost; is it still on, and the cable
 class Observer:
     """Reports the measurements of the controller, in a separate thread: commands may take a while.
 
-    `newest` is the last report, None before the first; `zeroed`, `watchdog_s` and `counts` come from the other thread.
+    `newest` is the last report, None before the first; `idle` is set by each in which no program plays; `zeroed`,
+    `watchdog_s` and `counts` come from the other thread.
 
     Silence counts only while this thread is awake, so that a stalled machine is not reported as a dead controller.
     """
 
     def __init__(self, receive: Any, channel: socket.socket, params: UrArmParams) -> None:
         self.connected = True
-        self.silent = self.zeroed = False
+        self.silent = self.zeroed = self.idle = False
         self.watchdog_s = 1.0 / params.watchdog_hz
         self.counts: Mapping[str, int] = {}
         self.newest: UrReport | None = None
@@ -344,6 +345,7 @@ class Observer:
             counts=self.counts,
         )
         self.newest = report
+        self.idle |= not report.playing
         try:
             self._channel.send(encoded(REPORT, report), socket.MSG_DONTWAIT)
         except BlockingIOError:
@@ -424,9 +426,11 @@ class Worker:
 
         It may be one of theirs that reads the same registers, or ours that ur-rtde started, without its watchdog.
         """
+        # A command that waits for its acknowledgement may outlast the stop: the observer has seen it.
+        idle, self._observer.idle = self._observer.idle, False
         playing = self._plays()
+        self._other_program |= (self._stopped or (idle and self._was_playing)) and playing
         self._was_playing |= playing
-        self._other_program |= self._stopped and playing
         self._stopped = self._was_playing and not playing
 
     def _let_go(self) -> None:
@@ -486,7 +490,7 @@ class Worker:
             time.sleep(0.005)
         self._set_watchdog()
         self._commands.reset()
-        self._stopped = False
+        self._stopped = self._observer.idle = False
 
     def _plays(self) -> bool:
         newest = self._observer.newest
