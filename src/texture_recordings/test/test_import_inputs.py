@@ -28,6 +28,10 @@ N = 600
 T = np.arange(N) / 100.0
 X = (np.sin(0.3 * np.arange(N)) + 0.001 * np.arange(N)).round(4)
 Y = np.cos(0.17 * np.arange(N)).round(4)
+PLAIN = {
+    'files': '{material}_{run}.csv', 'streams': {'signal': {'columns': ['x'], 'time': {'column': 't'}}},
+    'label': {'column': 'material'},
+}  # fmt: skip
 RATE = {'streams': {'signal': {'columns': ['x'], 'rate_hz': 100.0}}}
 
 Write = Callable[[Path], object]
@@ -38,10 +42,7 @@ def check(folder: Path, write: Write, content: dict, truth: Truth, kind: str = '
     """Import what is written into a folder, as `texture import` does."""
     (folder / 'in').mkdir()
     write(folder / 'in')
-    mapping = mapping_from({
-        'files': '{material}_{run}.csv', 'streams': {'signal': {'columns': ['x'], 'time': {'column': 't'}}},
-        'label': {'column': 'material'}, **content,
-    })  # fmt: skip
+    mapping = mapping_from({**PLAIN, **content})
     if isinstance(truth, str):
         with pytest.raises(InvalidData, match=truth):
             import_tables(mapping, folder / 'in', folder / 'bags', MAPPED[kind])
@@ -379,10 +380,7 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
 
 
 def test_files_at_another_depth_are_named_and_a_pointer_of_git_lfs_is_no_data(tmp_path: Path) -> None:
-    mapping = mapping_from({
-        'files': '{material}_{run}.csv', 'streams': {'signal': {'columns': ['x'], 'time': {'column': 't'}}},
-        'label': {'column': 'material'},
-    })  # fmt: skip
+    mapping = mapping_from(PLAIN)
     (tmp_path / 'deeper').mkdir()
     for folder in (tmp_path, tmp_path / 'deeper'):
         csv(T, X)(folder)

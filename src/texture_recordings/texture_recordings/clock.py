@@ -98,13 +98,16 @@ def estimated(steps: Array) -> tuple[float, float]:
     return simple if near else float(f'{rate_hz:.{SIGNIFICANT}g}'), burst_s
 
 
-def jumps_back(times: Array) -> AnyArray:
-    """Return the rows, (n,), at which another run begins within the times of the one before.
+def disorder(times: Array) -> tuple[AnyArray, AnyArray]:
+    """Return which rows, (n,), have a time before that of an earlier one, and which after that of a later one."""
+    return times < np.maximum.accumulate(times), times > np.minimum.accumulate(times[::-1])[::-1]
+
+
+def jumps_back(behind: AnyArray, ahead: AnyArray) -> AnyArray:
+    """Return the rows, (n,), at which another run begins within the times of the one before; see `disorder`.
 
     More than two rows are behind the newest there, and as many ahead of them: fewer are rows out of order.
     """
-    behind = times < np.maximum.accumulate(times)
-    ahead = times > np.minimum.accumulate(times[::-1])[::-1]
     starts = np.flatnonzero(behind & ~np.append(False, behind[:-1]))
     return np.array([row for row in starts.tolist() if row > IN_DISORDER and ahead[row - IN_DISORDER - 1 : row].all()
                      and behind[row : row + IN_DISORDER + 1].sum() > IN_DISORDER], dtype=np.intp)  # fmt: skip
@@ -131,14 +134,12 @@ def on_grid(
         rows = once(times, samples)
         left['repeated rows'] = count - len(rows)
     # Of rows that contradict each other by their times nobody knows which one is wrong.
-    behind = times[rows] < np.maximum.accumulate(times[rows])
-    ahead = times[rows] > np.minimum.accumulate(times[rows][::-1])[::-1]
-    out, jumps = int((behind | ahead).sum()), jumps_back(times[rows])
+    behind, ahead = disorder(times[rows])
+    out, jumps = int((behind | ahead).sum()), jumps_back(behind, ahead)
     left['rows out of order'] = out
-    first_back = rows[jumps[0]] if len(jumps) else int(np.argmax(steps < 0)) + 1
+    row = int(rows[jumps[0]]) if len(jumps) else int(np.argmax(steps < 0)) + 1
     rows = rows[~behind & ~ahead]
     if out > MAX_LEFT_OUT * count or (out and burst_s) or len(jumps):
-        row = int(first_back)
         bursts = ', which come in bursts,' if burst_s else ''
         raise ClockFault(
             row, f'time goes back from {times[row - 1]:.9g} to {times[row]:.9g} s, and {out} of {count} rows{bursts} '

@@ -28,6 +28,7 @@ from texture_recordings.clock import (
     MAX_LEFT_OUT,
     SAME_RATE,
     ClockFault,
+    disorder,
     estimated,
     forward,
     jumps_back,
@@ -157,19 +158,9 @@ def import_tables(
     report = ImportReport()
     with SlideBags(mapping, out) as bags:
         for path, place, fields in progress(_files(mapping, Path(source), kinds, report), 'import files'):
-            constants = {name: np.array(text) for name, text in fields.items()}
             for frame in frames(path, place, mapping):
                 with placed(frame.place):
-                    for name in sorted(constants.keys() & frame.columns.keys()):
-                        text, number = fields[name], number_of(fields[name])
-                        has = {*map(str, np.atleast_1d(frame.texts(name)).tolist())} - {'', text}
-                        if other := [one for one in has if number_of(one) != number]:
-                            raise InvalidData(
-                                f"'{name}' is '{text}' in the name and '{min(other)}' in a column; give the field "
-                                'another name in `files`'
-                            )
-                    whole = replace(frame, columns={**frame.columns, **constants})
-                    for slide in FrameSlides(mapping, whole, report).slides():
+                    for slide in FrameSlides(mapping, _with_fields(frame, fields), report).slides():
                         bags.write(*slide)
             if kind_of(path) == 'bag' and is_cut_off(path):
                 report.leave_out(
@@ -185,6 +176,18 @@ def import_tables(
     return report
 
 
+def _with_fields(frame: TableFrame, fields: Mapping[str, str]) -> TableFrame:
+    """Return a frame with the fields of its name; InvalidData if a column says otherwise."""
+    for name in sorted(fields.keys() & frame.columns.keys()):
+        has = {*map(str, np.atleast_1d(frame.texts(name)).tolist())} - {'', fields[name]}
+        if other := [one for one in has if number_of(one) != number_of(fields[name])]:
+            raise InvalidData(
+                f"'{name}' is '{fields[name]}' in the name and '{min(other)}' in a column; give the field another "
+                'name in `files`'
+            )
+    return replace(frame, columns={**frame.columns, **{name: np.array(text) for name, text in fields.items()}})
+
+
 def _files(
     mapping: TableMapping, source: Path, kinds: Sequence[str], report: ImportReport
 ) -> Iterator[tuple[Path, str, dict[str, str]]]:
@@ -192,12 +195,12 @@ def _files(
     if not source.exists():
         raise InvalidData(f"there is no '{source}'; give the folder that holds the files")
     whole, depth = source.is_file() or is_bag(source), mapping.files.count('/')
-    paths = [source] if whole else sorted(source.glob('/'.join('*' * (depth + 1))))
-    for path in [] if whole else sorted(source.rglob('*')):
+    for path in () if whole else sorted(source.rglob('*')):
         place = path.relative_to(source).as_posix()
         if place.count('/') != depth and path.is_file() and kind_of(path) in kinds and not is_bag(path.parent):
             report.leave_out('files lie in more or fewer folders than `files` names', 1, f"'{place}'")
-    for path in paths:
+    # Not those of the walk above, which does not follow links to folders.
+    for path in [source] if whole else sorted(source.glob('/'.join('*' * (depth + 1)))):
         place = path.name if whole else path.relative_to(source).as_posix()
         fields = template_fields(mapping.files, place)
         if path.is_dir() and not is_bag(path):
@@ -435,7 +438,7 @@ class FrameSlides:
                 part = times[before:stop]
                 if (np.diff(part) < 0).any():
                     rows = before + once(part, self._reference.samples[before:stop])
-                    starts = np.union1d(starts, rows[jumps_back(times[rows])])
+                    starts = np.union1d(starts, rows[jumps_back(*disorder(times[rows]))])
         spans = [slice(first, last) for first, last in pairwise([0, *starts.tolist(), count])]
         if wanted is not None:
             spans = [one for one in spans if _is_one_of(wanted[one.start], params.values or ['?*'])]
