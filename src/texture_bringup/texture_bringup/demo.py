@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from texture_bringup.feed import in_words
 from texture_bringup.launcher import ChildLauncher
 from texture_bringup.operator import ExplorationResult, Operator
 from texture_core.errors import ExplorationError, InvalidData, LaunchFailed
@@ -125,7 +126,7 @@ class Slide:
         if estimate.rejection is Rejection.OUTSIDE_TRAINING:
             return f'rejected, {estimate.message}'
         if estimate.rejection is not Rejection.NONE:
-            return f'rejected, {estimate.rejection.name.lower().replace("_", " ")} (nearest: {estimate.label})'
+            return f'rejected, {in_words(estimate.rejection)} (nearest: {estimate.label})'
         grade = f'; roughness {roughness.grade:.1f} of 5' if roughness.valid else ''
         early = ', ended early' if estimate.decided else ''
         return f'accepted as {estimate.label} after {estimate.evidence_s:.1f} s{early}{grade}'
@@ -311,7 +312,7 @@ def _draw_slide(axis: Any, slide: Slide) -> None:
         width, above = (2.0, 3) if number == best else (1.0, 2)
         axis.plot(seconds, values, color=colour, marker='.', linewidth=width, zorder=above)
     nearest = f'\nnearest: {final.label}' if final.label else ''
-    reason = final.rejection.name.lower().replace('_', ' ')
+    reason = in_words(final.rejection)
     verdict = f'accepted: {final.label}' if accepted else f'rejected: {reason}{nearest}'
     axis.set_title(f'{slide.title}\n{verdict}', color=COLOURS[2] if accepted else COLOURS[5])
     axis.set_ylim(0.0, 1.05)

@@ -8,6 +8,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict
+from enum import IntEnum
 from typing import Any
 
 import numpy as np
@@ -185,6 +186,11 @@ def places_of(channels: tuple[str, ...]) -> list[tuple[int, int]]:
 UNLIKE = 'it resembles no trained texture'
 
 
+def in_words(value: IntEnum) -> str:
+    """Return the name of a code as text: 'too little training'."""
+    return value.name.lower().replace('_', ' ')
+
+
 def texture_text(estimate: TextureEstimate) -> str:
     """Return a texture estimate as text, with the reason if it is rejected."""
     if not estimate.label:
@@ -192,7 +198,7 @@ def texture_text(estimate: TextureEstimate) -> str:
     nearest = f'{estimate.label}, confidence {estimate.confidence:.2f} after {estimate.evidence_s:.1f} s'
     if estimate.accepted:
         return nearest
-    reason = UNLIKE if estimate.rejection is Rejection.NOVEL else estimate.rejection.name.lower().replace('_', ' ')
+    reason = UNLIKE if estimate.rejection is Rejection.NOVEL else in_words(estimate.rejection)
     return f'unknown (nearest: {nearest}): {estimate.message or reason}'
 
 
@@ -364,7 +370,7 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Phase):
         return value.value
     if isinstance(value, Rejection):
-        return value.name.lower().replace('_', ' ')
+        return in_words(value)
     return str(value) if isinstance(value, int) and abs(value) > 2**53 else value
 
 

@@ -15,7 +15,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from texture_bringup.feed import FRAME_PERIOD_S, Feed
+from texture_bringup.feed import FRAME_PERIOD_S, Feed, in_words
 from texture_core.cli import add_namespace
 from texture_core.errors import ExplorationError
 from texture_core.types import NANOSECONDS
@@ -147,5 +147,5 @@ def finger_text(state: Mapping[str, Any]) -> str:
         for name, digits, unit in (('speed_m_s', 3, 'm/s'), ('force_n', 2, 'N'))
         if state[name] is not None
     ]
-    error = ExplorationError(state['error_code']).name.lower().replace('_', ' ') if state['error_code'] else ''
+    error = in_words(ExplorationError(state['error_code'])) if state['error_code'] else ''
     return '  '.join([*numbers, *filter(None, [state['motion'], error])]) or 'no exploration'
