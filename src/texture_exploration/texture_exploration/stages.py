@@ -11,6 +11,7 @@ from typing import NamedTuple
 from texture_core.errors import ExplorationError, MotionAborted
 from texture_core.types import Phase
 from texture_exploration.arms.arm import ArmCommand, ArmState, Vector
+from texture_exploration.guards import WAY_S
 from texture_exploration.paths import STEADY_S, Follower, smooth
 from texture_exploration.safety import SafetyLimits
 from texture_exploration.touch import TouchParams
@@ -18,7 +19,6 @@ from texture_exploration.watches import ContactLost, ContactWatch, OvershootWatc
 
 NEAR_M = 0.0005
 GROWTH_M = 0.002
-REST_S = 0.1  # of rest at the end of a lift with a force: the latest arm has stopped
 LEAST_LIFT_M_S = 0.005  # a lift without proof of free air also ends in time
 PRESSING_S = 0.1  # from contact to the wanted force: a step would oscillate on a stiff surface
 STEADY_HORIZON_S = 0.1  # the longest time for which a slide guarantees speed and force; ending it early takes as long
@@ -338,9 +338,10 @@ class LiftStage(Stage):
         if arm.position[2] < self._goal_m - NEAR_M:
             self._top_ns = None
             return ArmCommand(normal_m_s=self._touch.lift_speed_m_s if self._proven else self._gentle_m_s)
-        # What the finger met stops it later than the command: only the force at rest shows whether it must go back.
+        # A finger that meets something stops later than its command: only the force at rest, as long as the way back is
+        # known, shows whether it must go back.
         self._top_ns = time_ns if self._top_ns is None else self._top_ns
-        return None if self.free or time_ns - self._top_ns > REST_S * 1e9 else ArmCommand()
+        return None if self.free or time_ns - self._top_ns > WAY_S * 1e9 else ArmCommand()
 
     def watch_anew(self) -> None:
         """Watch the force from here on: that on the way back from an obstacle is no part of the rise."""
