@@ -229,7 +229,7 @@ def experiment(name: str, root: Path) -> str:
                 fractions = f'{percent(part["test"])} | – | {percent(part.get("over_seeds"))}'
                 rows.append(f'| {task} | {method}: {condition} | – | – | {fractions} |')
     table = '\n'.join(rows) if numbers.get('tasks') else ''
-    anchor = difficulty(numbers.get('difficulty') or {})
+    anchor = difficulty(numbers.get('difficulty') or {}, numbers.get('tasks', {}))
     unit = 100.0 if numbers.get('tasks') else 1.0  # percentage points, or grades
     data = f'Data: {content["data"]}. Split: {content["split"]}.'
     return f'{data}\n\n{table}\n\n{anchor}\n{_findings(numbers["findings"], seeds[0], count, unit)}\n'
@@ -256,11 +256,16 @@ def signed(interval: list[float], unit: float) -> str:
     return f'{middle:+.{digits}f} ({low:+.{digits}f} to {high:+.{digits}f})'
 
 
-def difficulty(chosen: dict[str, Any]) -> str:
-    """Return which figure the scene was made for: it is no result."""
+def difficulty(chosen: dict[str, Any], tasks: dict[str, Any]) -> str:
+    """Return which figure the scene was made for, and how far it is from that: it is no result."""
     if not chosen:
         return ''
     shortfall = f'; {chosen["shortfall"]}' if chosen.get('shortfall') else ''
+    for task, methods in tasks.items() if chosen.get('here') else ():
+        for method, figures in methods.items():
+            if f': {method}, {task}: ' in chosen['set_by'] and 'over_seeds' in figures:
+                off = 100 * (figures['over_seeds'][0] - chosen['paper'])
+                shortfall += f'; over all seeds {off:+.1f} points from it'
     setting = f'Anchor (no finding): the scene setting "{chosen["setting"]}" was chosen by {chosen["set_by"]}'
     return f'{setting}{shortfall}.\n'
 
