@@ -9,6 +9,7 @@ import math
 import multiprocessing
 import os
 import platform
+import signal
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
@@ -150,6 +151,7 @@ def _forked(work: Callable[[Job], Out], jobs: Sequence[Job]) -> Iterator[tuple[i
 
 
 def _begin(work: Callable[[Any], Any]) -> None:
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # the command's handler raises KeyboardInterrupt, a traceback here
     _work[:] = [work, single_blas_thread()]  # from here on: nothing leaves this block
 
 
