@@ -353,7 +353,7 @@ def explored(trial: ForceTrial) -> TrialEnd:
 STIFFNESSES_N_M = (200.0, 600.0, 2000.0, 6000.0, 20000.0)
 DELAYS_S = (0.0, 0.008, 0.02, 0.05)
 NOISES_N = (0.003, 0.01, 0.02)
-SEEDS, QUICK_STEP = 5, 5  # of the noise; every so many trials of one seed
+SEEDS, QUICK_STEP = 20, 5  # of the noise; every so many trials of one seed
 GAPS_M = (0.001, 0.002, 0.004, 0.008, 0.012)
 BREAKS_S = (0.1, 0.3, 0.7, 2.0, 5.0)
 FOUND_S = (0.05, 0.5, 2.0, 6.0)
