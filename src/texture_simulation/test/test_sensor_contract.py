@@ -21,8 +21,8 @@ from texture_simulation.devices.fingers import ByteFaults, FrameFaults
 
 pytestmark = pytest.mark.realtime
 
-# A recording; a card that miniaudio opens, whose rows of the contract are in test_sound_card.py.
-WITHOUT_DEVICE = {'file', 'sound_card'}
+# A card that miniaudio opens, whose rows of the contract are in test_sound_card.py.
+WITHOUT_DEVICE = {'sound_card'}
 # Number or time their packets; others of these differ by a table alone.
 NUMBERED = ('tsf85', 'biotac', 'daq', 'pvdf')
 FAMILIES = (*NUMBERED, 'anyskin')
