@@ -508,55 +508,38 @@ def parameters_of(cls: type) -> list[Parameter]:
     return listed
 
 
-def from_mapping(cls: type[T], values: Mapping[str, Any], where: str = '') -> T:
-    """Build a parameter dataclass from a mapping (a YAML section); parameters that it lacks keep their default."""
+def from_mapping(cls: type[T], values: Any, where: str = '') -> T:
+    """Build a parameter dataclass from a mapping (a YAML section); parameters that it lacks keep their default.
+
+    Fields that are dataclasses, or mappings of names to these, are its sections. A number in place of a text is
+    converted to text: YAML reads a column named 3 as a number.
+    """
     if not (isinstance(cls, type) and dataclasses.is_dataclass(cls)):
         raise InvalidParameter(f'{where}: {cls!r} is not a class with parameters; name a dataclass')
-    return cls(**_read(cls, values, where, _checked))
-
-
-def _read(cls: type, values: Any, where: str, check: Callable[[Parameter, Any, str], Any]) -> dict[str, Any]:
-    """Return the checked values of a mapping for the parameters of a dataclass."""
     known = {parameter.name: parameter for parameter in parameters_of(cls)}
-    place = f'{where}: ' if where else ''
+    place, values = f'{where}: ' if where else '', {} if values is None else values
     if not isinstance(values, Mapping):
         raise InvalidParameter(f'{place}came {safe_repr(values)}; a mapping of parameter names to values is needed')
     for name in values:
         if name not in known:
             raise InvalidParameter(f'{place}{unknown_name(str(name), known, "parameter")}')
-    return {name: check(known[name], value, where) for name, value in values.items()}
-
-
-def _checked(parameter: Parameter, value: Any, where: str) -> Any:
-    try:
-        return parameter.check(value)
-    except InvalidParameter as error:
-        raise InvalidParameter(f'{where}: {error}' if where else str(error)) from error
-
-
-# --------------------
-# Read a tree of parameter dataclasses from a mapping (a YAML file): fields that are dataclasses are its sections.
-
-
-def tree_from_mapping(cls: type[T], values: Any, where: str) -> T:
-    """Build a dataclass whose fields are parameters, nested dataclasses, or mappings of names to these.
-
-    A number in place of a text is converted to text: YAML reads a column named 3 as a number.
-    """
-    read = _read(cls, {} if values is None else values, where, _value)
+    read = {name: _value(known[name], value, where) for name, value in values.items()}
     try:
         return cls(**read)
     except InvalidParameter as error:
-        raise InvalidParameter(f'{where}: {error}') from error
+        raise InvalidParameter(f'{place}{error}') from error
 
 
 def _value(parameter: Parameter, value: Any, where: str) -> Any:
     kind: Any = parameter.type
     if dataclasses.is_dataclass(kind):
-        return tree_from_mapping(kind, value, f'{where}, {parameter.name}')  # type: ignore[arg-type]
+        return from_mapping(kind, value, f'{where}, {parameter.name}')  # type: ignore[arg-type]
     if typing.get_origin(kind) in (Mapping, dict):
         return _values_by_name(parameter, value, where)
-    return _checked(parameter, _as_text(kind, value), where)
+    try:
+        return parameter.check(_as_text(kind, value))
+    except InvalidParameter as error:
+        raise InvalidParameter(f'{where}: {error}' if where else str(error)) from error
 
 
 def _values_by_name(parameter: Parameter, value: Any, where: str) -> dict[str, Any]:
