@@ -61,7 +61,7 @@ def test_an_address_that_is_none_of_a_dask_scheduler_is_named(address):
 RECIPE = Recipe.from_mapping(
     {
         'windows': {'length_s': 0.25, 'hop_s': 0.25},
-        'inputs': {'signal': {'features': ['log_bands']}},
+        'inputs': {'signal': {'features': ['mean_log_bands']}},
         'learner': {'sklearn': {'estimator': 'sklearn.naive_bayes:GaussianNB'}},
         'training': {'hop_s': 0.25},
     },
@@ -382,7 +382,7 @@ def test_a_csv_of_others_becomes_a_table_a_comparison_and_a_chart(
     (tmp_path / 'mapping.yaml').write_text(MAPPING)
     import_tables(load_mapping(tmp_path / 'mapping.yaml'), write_csv(tmp_path / 'in', recordings()), tmp_path / 'bags')
     names = []
-    for name, feature in (('bands', 'log_bands'), ('level', 'mean')):
+    for name, feature in (('bands', 'mean_log_bands'), ('level', 'mean')):
         (tmp_path / f'{name}.yaml').write_text(SMALL % feature)
         names.append(str(tmp_path / f'{name}.yaml'))
     parser = argparse.ArgumentParser()
