@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from texture_benchmarks.study import BenchmarkOptions
-from texture_benchmarks.trust import ROWS, UNDISTURBED, VIBRATION, disturbed, outcome, run, trained_ranges
+from texture_benchmarks.trust import ROWS, UNDISTURBED, VIBRATION, disturbed, outcome, run
 from texture_core.types import ExplorationState, Phase, Rejection, TactileSignal, TextureEstimate
-from texture_estimation.recipe import load_recipe
 from texture_evaluation.metrics import SlideResult
 from texture_recordings.slides import LabelledSlide
 
@@ -44,13 +43,6 @@ def test_wear_halves_the_power_at_its_cut_off_and_half_the_speed_the_frequency()
     np.testing.assert_allclose(slower[100:-100], np.sin(2 * np.pi * 50.0 * time_s)[100:-100], atol=0.01)
 
 
-def test_what_the_training_covers_is_read_from_the_recipe() -> None:
-    covered = trained_ranges(load_recipe('default').augmentation)
-    assert covered['gain'] == pytest.approx((1 / 1.6, 1.6))
-    assert covered['white noise'] == (0.0, 0.05)
-    assert covered['speed'] == pytest.approx((0.85, 1.15))
-
-
 def batches(samples: np.ndarray, rate_hz: float, batch: int) -> LabelledSlide:
     """Return a slide that came in batches."""
     slide = LabelledSlide(Path(), 'a/1', 'a', 1, 0, None)
@@ -78,16 +70,6 @@ def test_a_loss_stays_a_loss() -> None:
     slide = dataclasses.replace(slide, signals={VIBRATION: [slide.signals[VIBRATION][0], late]})
     found = disturbed(slide, ROWS['gain'], 2.0, np.random.default_rng(0)).signals[VIBRATION]
     assert [(run.first_sample, len(run.samples)) for run in found] == [(0, 500), (600, 500)]
-
-
-@pytest.mark.parametrize('name', ROWS)
-def test_every_row_changes_the_samples_and_keeps_the_slide(name: str) -> None:
-    before = np.random.default_rng(0).standard_normal((3000, 1)).astype(np.float32)
-    slide, row = batches(before, RATE_HZ, 100), ROWS[name]
-    for strength in row.strengths:
-        found = disturbed(slide, row, strength, np.random.default_rng(0))
-        assert found.name == slide.name
-        assert not np.array_equal(found.signals[VIBRATION][0].samples, before)
 
 
 def test_the_same_other_finger_touches_all_slides() -> None:

@@ -190,7 +190,7 @@ def test_what_is_no_regular_file_is_refused_at_once(kind: str, tmp_path: Path) -
     ODD[kind](tmp_path / 'odd')
     (tmp_path / 'link').symlink_to(tmp_path / 'odd')
     for path in (tmp_path / 'odd', tmp_path / 'link'):
-        with pytest.raises(FileRefused, match=f'it is a {kind}; a regular file is needed'):
+        with pytest.raises(FileRefused, match='a regular file is needed'):
             open_regular(path)
 
 

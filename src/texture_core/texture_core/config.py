@@ -20,7 +20,7 @@ import traceback
 import typing
 import zipfile
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, BinaryIO, TypeVar, cast
@@ -191,11 +191,6 @@ def executable(package: str, name: str) -> Path:
 
 MB = 1_000_000
 MAX_FILE_BYTES = 1000 * MB
-KINDS: Mapping[str, Callable[[int], bool]] = {
-    'a named pipe': stat.S_ISFIFO,
-    'a socket': stat.S_ISSOCK,
-    'a device': lambda mode: stat.S_ISCHR(mode) or stat.S_ISBLK(mode),
-}
 LAST_CHARACTER = 0x10FFFF  # of Unicode; NumPy keeps 32 bits for each and compares none
 # What zipfile and NumPy raise at content that is damaged, cut off or claims more than there is.
 BROKEN_CONTENT = (
@@ -228,8 +223,7 @@ def _check_regular(status: os.stat_result, most_bytes: int | None) -> None:
     if stat.S_ISDIR(status.st_mode):
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
     if not stat.S_ISREG(status.st_mode):
-        kind = next((name for name, holds in KINDS.items() if holds(status.st_mode)), 'something else')
-        raise FileRefused(f'it is {kind}; a regular file is needed')
+        raise FileRefused('it is a device, a named pipe or a socket; a regular file is needed')
     if most_bytes is not None and status.st_size > most_bytes:
         raise FileRefused(f'it has more than {most_bytes / MB:.3g} MB, which is the limit for such a file')
 

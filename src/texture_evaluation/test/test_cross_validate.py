@@ -24,7 +24,6 @@ from texture_evaluation.cross_validation import (
     FoldResult,
     clustered,
     compare,
-    compare_all,
     cross_validate,
     dask_backend,
     interval,
@@ -355,13 +354,6 @@ def test_the_interval_of_the_difference_is_that_of_pairs() -> None:
     one = compare(cross_validation('a', common), cross_validation('b', common))
     assert one.slide_interval == (0.0, 0.0)
     assert one.p_value == 1.0
-
-
-def test_p_values_of_several_comparisons_are_adjusted() -> None:
-    base, half = [False] * 10, [True] * 6 + [False] * 4
-    compared = compare_all([cross_validation(name, right) for name, right in (('a', base), ('b', half), ('c', base))])
-    assert [one.p_value for one in compared] == pytest.approx([2 / 64, 1.0])
-    assert [one.p_value_adjusted for one in compared] == pytest.approx([4 / 64, 1.0])
 
 
 def test_recipes_come_before_bags(tmp_path: Path) -> None:

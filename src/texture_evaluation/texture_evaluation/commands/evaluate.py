@@ -17,7 +17,7 @@ from texture_estimation.model import both_files, load_model
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.charts import refuse_chart_format
 from texture_evaluation.cross_validation import (
-    compare_all,
+    compare,
     comparison_chart,
     cross_validate,
     dask_backend,
@@ -92,7 +92,7 @@ def _cross_validate(options: argparse.Namespace) -> int:
                 results.append(cross_validate(recipe, dataset, split.splitter, jobs, groups=split.groups))
     for line in (line for result in results for line in table(result, split.name)):
         print(line)
-    compared = compare_all(results)
+    compared = [compare(results[0], other) for other in results[1:]]
     for one in compared:
         print(sentence(one))
     if options.json:
