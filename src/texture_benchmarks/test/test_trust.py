@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 import dataclasses
-import os
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,6 @@ from texture_recordings.slides import LabelledSlide
 pytestmark = pytest.mark.ros
 
 RATE_HZ = 1000.0
-DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
 
 
 def changed(row: str, strength: float, samples: np.ndarray) -> np.ndarray:
@@ -101,9 +99,8 @@ def test_outcomes_are_counted_at_the_first_decided_estimate_and_at_the_end() -> 
 
 
 @pytest.mark.benchmark
-@pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
-def test_the_quick_form_gives_figures_of_all_compared(tmp_path: Path) -> None:
-    numbers = run(BenchmarkOptions(tmp_path, DATA, quick=True)).numbers
+def test_the_quick_form_gives_figures_of_all_compared(tmp_path: Path, data: Path) -> None:
+    numbers = run(BenchmarkOptions(tmp_path, data, quick=True)).numbers
     assert len(numbers['default']['outcomes']) == len(numbers['SVC on log bands']['outcomes']) == 1 + 8 + 4
     assert numbers['default']['outcomes'][UNDISTURBED]['label_right'] > 12  # of 18
     for one in numbers['default']['outcomes'].values():
