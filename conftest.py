@@ -145,6 +145,15 @@ def graded_windows() -> Any:
 
 
 @pytest.fixture(scope='session')
+def data() -> Path:
+    """Return the folder of the recorded data sets; skip a test where there is none."""
+    folder = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[1] / 'shared' / 'data')
+    if not folder.is_dir():
+        pytest.skip(f'no recorded data in {folder}; set TEXTURE_DATA to its folder')
+    return folder
+
+
+@pytest.fixture(scope='session')
 def simulated(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder of bags: six slides of 1.2 s over each of three simulated surfaces."""
     from texture_simulation.offline import SlidePlan, write_simulated  # noqa: PLC0415

@@ -108,11 +108,7 @@ SCIPY = frozenset({'scipy'})
 LAYERS: Mapping[str, Layer] = {
     'texture_msgs': Layer(of()),
     'texture_core': Layer(of('msgs'), never=LEARNING | DRAWING | SCIPY),
-    'texture_drivers': Layer(
-        of('msgs', 'core'),
-        never=LEARNING | DRAWING | SCIPY,
-        late={'texture_drivers.file': SCIPY, 'texture_drivers.pvdf': SCIPY},
-    ),
+    'texture_drivers': Layer(of('msgs', 'core'), never=LEARNING | DRAWING | SCIPY),
     'texture_features': Layer(of('msgs', 'core'), never=LEARNING | DRAWING),
     'texture_estimation': Layer(of('msgs', 'core', 'features'), never=DRAWING | {'rosbags'}),
     'texture_recordings': Layer(

@@ -1,6 +1,5 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-import os
 from pathlib import Path
 
 import numpy as np
@@ -23,8 +22,6 @@ from texture_estimation.recipe import load_recipe
 from texture_features.feature_set import LabelledFeatures
 
 pytestmark = pytest.mark.ros
-
-DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
 
 
 def clouds(labels=('cork', 'felt', 'wood'), slides=6, windows=6):
@@ -55,9 +52,8 @@ def test_a_course_of_examples_ends_as_good_as_training_again(tmp_path: Path) -> 
 
 
 @pytest.mark.benchmark
-@pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
-def test_recorded_materials_are_added_slide_by_slide(tmp_path: Path) -> None:
-    result, _ = run_benchmark('learning', BenchmarkOptions(tmp_path, DATA, quick=True))
+def test_recorded_materials_are_added_slide_by_slide(tmp_path: Path, data: Path) -> None:
+    result, _ = run_benchmark('learning', BenchmarkOptions(tmp_path, data, quick=True))
     after_two = result.numbers['slides']['2']
     assert after_two['incremental']['slides'] > 0.7
     assert after_two['incremental']['windows'] > after_two['retrained']['windows'] - 0.1
@@ -88,7 +84,6 @@ def test_simulated_slides_are_one_window_of_each_texture_with_each_motion() -> N
     assert one == pytest.approx(simulated_slides(MOTIONS[:1], 1, np.random.default_rng(0)))
 
 
-recorded = pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
 DEVIATIONS = {'textures': 5.0, 'slides': 2.0, 'windows': 1.0}
 
 
@@ -111,9 +106,8 @@ def test_drawn_features_vary_as_much_among_textures_slides_and_windows_as_the_re
 
 
 @pytest.mark.benchmark
-@recorded
-def test_a_small_training_on_drawn_features_recognises_some_and_reports_what_it_took(tmp_path: Path) -> None:
-    result, _ = run_benchmark('scale', BenchmarkOptions(out=tmp_path, quick=True, data=DATA))
+def test_a_small_training_on_drawn_features_recognises_some_and_reports_its_cost(tmp_path: Path, data: Path) -> None:
+    result, _ = run_benchmark('scale', BenchmarkOptions(tmp_path, data, quick=True))
     [few] = result.numbers['textures, default']
     assert few['training_windows'] == 6 * 5 * 5
     assert few['slide_accuracy'] > 0.4  # chance is a sixth

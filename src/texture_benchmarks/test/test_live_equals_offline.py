@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A bag replayed through the running nodes gives the estimates that the evaluation gets from it."""
 
-import os
 import time
 from collections import defaultdict
 from collections.abc import Callable
@@ -25,7 +24,6 @@ from texture_recordings.slides import find_slides
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
-DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data') / 'biotac20'
 Estimates = dict[str, list[TextureEstimate]]
 
 
@@ -124,11 +122,10 @@ def test_simulated_slides_are_evaluated_live_as_offline(
 
 
 @pytest.mark.benchmark
-@pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
 @pytest.mark.parametrize(('recipe', 'rate'), [('default', 1.0), ('vibration-and-taxels', 5.0)])
-def test_recorded_slides_are_evaluated_live_as_offline(recipe: str, rate: float, tmp_path: Path) -> None:
+def test_recorded_slides_are_evaluated_live_as_offline(recipe: str, rate: float, tmp_path: Path, data: Path) -> None:
     materials = ['material03', 'material05', 'material12']
-    import_biotac20(DATA, tmp_path / 'bags', '1-4,40', materials)
+    import_biotac20(data / 'biotac20', tmp_path / 'bags', '1-4,40', materials)
     train_from_bags(recipe, [tmp_path / 'bags'], '1-4', tmp_path / 'model')
     estimates, health = live(tmp_path / 'model.npz', tmp_path / 'bags', '5', rate, 55)
     assert_equal(estimates, offline(load_model(tmp_path / 'model'), tmp_path / 'bags', '5'))

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Accuracy over sliding and computing time: which methods, how evidence and votes are counted, what is drawn."""
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +17,6 @@ from texture_estimation.recipe import FAST_TOPIC, load_recipe
 from texture_recordings.slides import LabelledSlide
 
 pytestmark = pytest.mark.ros
-
-DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
 
 
 @pytest.mark.parametrize('job', [job for job in JOBS if job.name not in CLASSIFIERS])
@@ -70,9 +67,8 @@ def test_names_at_lines_keep_a_spacing_and_their_order() -> None:
 
 
 @pytest.mark.benchmark
-@pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
-def test_later_slides_are_recognised_and_every_figure_is_there(tmp_path: Path) -> None:
-    result = BENCHMARKS['overview'](BenchmarkOptions(tmp_path, DATA, quick=True))
+def test_later_slides_are_recognised_and_every_figure_is_there(tmp_path: Path, data: Path) -> None:
+    result = BENCHMARKS['overview'](BenchmarkOptions(tmp_path, data, quick=True))
     assert all(chart.is_file() for chart in result.charts)
     cells = [result.numbers[VIBRATION]['default'], result.numbers[ALL_CHANNELS]['vibration-and-taxels']]
     for cell in cells:

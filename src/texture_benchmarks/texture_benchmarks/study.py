@@ -8,7 +8,6 @@ import json
 import math
 import multiprocessing
 import os
-import platform
 import signal
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -25,11 +24,11 @@ from texture_core.errors import DeviceError, InvalidData
 from texture_core.types import AnyArray
 from texture_estimation.recipe import Recipe
 from texture_evaluation.cross_validation import interval, single_blas_thread
+from texture_papers.protocol import ExperimentResult
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.public_sets import IMPORTS
 from texture_recordings.slides import STREAMS
 
-CPU_INFO = Path('/proc/cpuinfo')
 DATA = {
     'biotac20': 'BioTac, 20 materials × 40 slides of 6 s (github dexrob/BioTac_slide_20_50, Gao et al. 2020)',
     'ntp21': 'MEMS array of 9 taxels, 21 textures × 4 speeds × 4 forces, one slide each (github LIMB-UCF/NTP)',
@@ -72,27 +71,8 @@ class BenchmarkResult:
 
     def write(self, out: Path, name: str, measured: str | None) -> Path:
         """Write the JSON and return its path; what was `measured` is the docstring of what measured it."""
-        out.mkdir(parents=True, exist_ok=True)
-        content = {
-            'name': name,
-            'measured': ' '.join((measured or '').split()),
-            'data': self.data,
-            'split': self.split,
-            'machine': machine(),
-            'numbers': self.numbers,
-            'charts': [chart.name for chart in self.charts],
-        }
-        path = out / f'{name}.json'
-        path.write_text(json.dumps(content, indent=2, ensure_ascii=False) + '\n', encoding='utf-8')
-        return path
-
-
-def machine() -> str:
-    """Return the processor, how many of its cores there are, and the Python in use."""
-    lines = CPU_INFO.read_text(encoding='utf-8', errors='replace').splitlines() if CPU_INFO.exists() else []
-    models = [line.partition(':')[2].strip() for line in lines if line.startswith('model name')]
-    model = models[0] if models else platform.machine()
-    return f'{model}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}'
+        sentence = ' '.join((measured or '').split())
+        return ExperimentResult(name, sentence, self.data, self.split, self.numbers, self.charts).write(out)
 
 
 Job = TypeVar('Job')

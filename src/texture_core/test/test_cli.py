@@ -8,7 +8,6 @@ import time
 from pathlib import Path
 
 from texture_core import cli
-from texture_core.errors import InvalidData
 
 
 def test_a_long_task_says_how_far_it_is_and_a_nested_or_short_one_nothing(monkeypatch, capsys) -> None:
@@ -21,12 +20,6 @@ def test_a_long_task_says_how_far_it_is_and_a_nested_or_short_one_nothing(monkey
         with cli.task('spell'):
             time.sleep(0.25 if letter == 'b' else 0.0)
     assert capsys.readouterr().err == 'count letters 1 of 2, 0 s\n'
-
-
-def test_a_sentence_on_a_file_has_no_number_of_the_operating_system() -> None:
-    error = FileNotFoundError(2, 'No such file or directory', '/nowhere')
-    sentence = str(InvalidData(f"'x' cannot be read: {error}; give another"))
-    assert sentence == "'x' cannot be read: No such file or directory; give another"
 
 
 def test_ctrl_c_while_a_node_imports_ends_it_with_0_and_without_a_traceback(tmp_path: Path) -> None:

@@ -19,7 +19,6 @@ from texture_core.config import (
     MAX_CHARACTERS,
     MAX_FILE_BYTES,
     Archive,
-    Arrays,
     FileRefused,
     find,
     find_file,
@@ -30,17 +29,11 @@ from texture_core.config import (
     open_regular,
     param,
     parameters_of,
-    parse_json,
-    parse_yaml,
     read_array,
     read_bounded,
     read_text,
 )
 from texture_core.errors import InvalidParameter, UnknownName
-
-
-def test_a_name_is_looked_up() -> None:
-    assert find({'hjorth': 1}, 'hjorth', 'feature') == 1
 
 
 def test_an_unknown_name_is_answered_with_the_nearest() -> None:
@@ -96,12 +89,6 @@ def test_programs_and_parts_of_python_are_not_imported_for_a_name(name: str) -> 
     assert name.partition(':')[0] not in sys.modules
 
 
-def test_a_path_of_the_user_wins(tmp_path: Path) -> None:
-    path = tmp_path / 'mine.yaml'
-    path.write_text('')
-    assert find_file(str(path), 'texture_core', 'config', 'recipe') == path
-
-
 def test_a_shipped_file_is_found_by_name_in_an_installation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shipped = tmp_path / 'share' / 'some_package' / 'config'
     shipped.mkdir(parents=True)
@@ -130,12 +117,8 @@ class Params:
     loud: bool = param(False, 'Say more.')
 
 
-def test_what_is_not_named_keeps_its_default() -> None:
-    assert from_mapping(Params, {'count': 5}) == Params(count=5)
-
-
-def test_a_whole_number_serves_where_a_number_is_needed() -> None:
-    assert from_mapping(Params, {'length_s': 1}).length_s == 1.0
+def test_what_is_not_named_keeps_its_default_and_a_whole_number_serves_where_a_number_is_needed() -> None:
+    assert from_mapping(Params, {'count': 5, 'length_s': 1}) == Params(count=5, length_s=1.0)
 
 
 @pytest.mark.parametrize(
@@ -160,47 +143,24 @@ def test_a_bad_value_is_refused_with_what_is_allowed(values: object, sentence: s
     assert str(refusal.value).startswith('recipe x: ')
 
 
-def test_parameters_know_default_unit_and_range() -> None:
-    length_s, *_ = parameters_of(Params)
-    assert (length_s.default, length_s.range_text, length_s.description) == (
-        0.5,
-        '0.01 to 10.0 s',
-        'Length of one window.',
-    )
-
-
 BAD = {
-    'deep nesting': '[' * 100_000,
-    'too much': 'x' * (MAX_CHARACTERS + 1),
-    'a Python object': '!!python/object/apply:os.system [exit 1]',
-    'no date': 'a: 2024-99-99',
-    'cut off': '{a: ',
-    'two documents': 'a: 1\n---\nb: 2',
-    'a list as a key': '? [1]\n: 2',
+    'deep nesting': b'[' * 100_000,
+    'too much': b'x' * (MAX_CHARACTERS + 1),
+    'a Python object': b'!!python/object/apply:os.system [exit 1]',
+    'no date': b'a: 2024-99-99',
+    'cut off': b'{a: ',
+    'two documents': b'a: 1\n---\nb: 2',
+    'a list as a key': b'? [1]\n: 2',
+    'no text': b'\xff\xd8\xff',
 }
 
 
 @pytest.mark.parametrize('what', BAD)
 def test_bad_yaml_is_refused_with_one_line_and_soon(what: str, tmp_path: Path) -> None:
-    file = tmp_path / 'file.yaml'
-    file.write_text(BAD[what])
+    (tmp_path / 'file.yaml').write_bytes(BAD[what])
     with pytest.raises(InvalidParameter, match=r"scene '.*' is not YAML that can be read: ") as caught:
-        load_yaml(file, 'scene')
+        load_yaml(tmp_path / 'file.yaml', 'scene')
     assert '\n' not in str(caught.value)
-
-
-def test_yaml_is_read_with_its_aliases() -> None:
-    assert parse_yaml('a: &a {x: 1}\nb: {<<: *a, y: 2}\nc: [*a, *a]') == {
-        'a': {'x': 1}, 'b': {'x': 1, 'y': 2}, 'c': [{'x': 1}, {'x': 1}],
-    }  # fmt: skip
-    assert parse_yaml('# nothing') is None
-
-
-def test_bytes_that_are_no_text_and_a_missing_file_are_refused(tmp_path: Path) -> None:
-    (tmp_path / 'image.yaml').write_bytes(b'\xff\xd8\xff')
-    for name in ('image.yaml', 'missing.yaml'):
-        with pytest.raises(InvalidParameter, match=name):
-            load_yaml(tmp_path / name, 'scene')
 
 
 @pytest.mark.parametrize('text', ['[' * 100_000, '{"recipe"', '[]', '3', '"x"', '\x00'])
@@ -208,10 +168,6 @@ def test_a_bad_card_is_refused(text: str, tmp_path: Path) -> None:
     (tmp_path / 'card.json').write_text(text)
     with pytest.raises(InvalidParameter, match='model card'):
         load_card(tmp_path / 'card.json')
-
-
-def test_json_is_read() -> None:
-    assert parse_json('{"a": [1, null]}') == {'a': [1, None]}
 
 
 # Only regular files are read, and no more of them than is allowed.
@@ -232,10 +188,9 @@ ODD: dict[str, Callable[[Path], None]] = {'device': make_device, 'named pipe': o
 @pytest.mark.parametrize('kind', ODD)
 def test_what_is_no_regular_file_is_refused_at_once(kind: str, tmp_path: Path) -> None:
     ODD[kind](tmp_path / 'odd')
+    (tmp_path / 'link').symlink_to(tmp_path / 'odd')
     for path in (tmp_path / 'odd', tmp_path / 'link'):
-        if path.name == 'link':
-            path.symlink_to(tmp_path / 'odd')
-        with pytest.raises(FileRefused, match=f'it is a {kind}; a regular file is needed'):
+        with pytest.raises(FileRefused, match='a regular file is needed'):
             open_regular(path)
 
 
@@ -252,15 +207,6 @@ def test_a_file_is_read_up_to_its_limit(tmp_path: Path) -> None:
     assert read_text(tmp_path / 'file', 6) == 'äöü'
     with pytest.raises(FileRefused, match=r'it has more than 5e-06 MB'):
         read_bounded(tmp_path / 'file', 5)
-
-
-@pytest.mark.parametrize('array', [np.arange(6.0).reshape(2, 3), np.asfortranarray(np.eye(3)), np.array(['a', 'bc'])])
-def test_an_array_is_what_numpy_wrote(array: np.ndarray, tmp_path: Path) -> None:
-    np.save(tmp_path / 'a.npy', array)
-    with open_regular(tmp_path / 'a.npy') as file:
-        read = read_array(file)
-    assert read.dtype == array.dtype
-    np.testing.assert_array_equal(read, array)
 
 
 HEADERS = {
@@ -288,14 +234,3 @@ def test_an_archive_that_unpacks_to_more_than_a_gigabyte_is_refused() -> None:
     assert Archive(file).read('a') == b'some'
     with pytest.raises(FileRefused, match='unpacks to more than 1000 MB'):
         Archive(io.BytesIO(lying))
-
-
-def test_arrays_of_an_archive_are_those_that_numpy_wrote() -> None:
-    file = io.BytesIO()
-    np.savez_compressed(file, a=np.arange(3), zeros=np.zeros(5))
-    arrays = Arrays(file)
-    assert arrays.names == ('a', 'zeros')
-    assert 'a' in arrays
-    np.testing.assert_array_equal(arrays['a'], np.arange(3))
-    with pytest.raises(KeyError):
-        arrays['b']

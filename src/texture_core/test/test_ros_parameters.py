@@ -39,12 +39,9 @@ def test_defaults_ranges_and_descriptions_reach_ros(make_node: Any) -> None:
     assert descriptor.floating_point_range[0].to_value == 10.0
 
 
-def test_a_given_value_is_used(make_node: Any) -> None:
-    assert declare(make_node(length_s=2.0), Params).length_s == 2.0
-
-
-def test_a_whole_number_is_taken_for_a_float(make_node: Any) -> None:
-    assert declare(make_node(length_s=2), Params).length_s == 2.0
+@pytest.mark.parametrize('given', [2.0, 2])
+def test_a_given_value_is_used_and_a_whole_number_is_taken_for_a_float(make_node: Any, given: float) -> None:
+    assert declare(make_node(length_s=given), Params).length_s == 2.0
 
 
 @pytest.mark.parametrize('bad', [{'length_s': 11.0}, {'length_s': 'long'}, {'name': 'z'}])

@@ -20,7 +20,7 @@ import traceback
 import typing
 import zipfile
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, BinaryIO, TypeVar, cast
@@ -191,11 +191,6 @@ def executable(package: str, name: str) -> Path:
 
 MB = 1_000_000
 MAX_FILE_BYTES = 1000 * MB
-KINDS: Mapping[str, Callable[[int], bool]] = {
-    'a named pipe': stat.S_ISFIFO,
-    'a socket': stat.S_ISSOCK,
-    'a device': lambda mode: stat.S_ISCHR(mode) or stat.S_ISBLK(mode),
-}
 LAST_CHARACTER = 0x10FFFF  # of Unicode; NumPy keeps 32 bits for each and compares none
 # What zipfile and NumPy raise at content that is damaged, cut off or claims more than there is.
 BROKEN_CONTENT = (
@@ -228,8 +223,7 @@ def _check_regular(status: os.stat_result, most_bytes: int | None) -> None:
     if stat.S_ISDIR(status.st_mode):
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
     if not stat.S_ISREG(status.st_mode):
-        kind = next((name for name, holds in KINDS.items() if holds(status.st_mode)), 'something else')
-        raise FileRefused(f'it is {kind}; a regular file is needed')
+        raise FileRefused('it is a device, a named pipe or a socket; a regular file is needed')
     if most_bytes is not None and status.st_size > most_bytes:
         raise FileRefused(f'it has more than {most_bytes / MB:.3g} MB, which is the limit for such a file')
 
@@ -508,55 +502,38 @@ def parameters_of(cls: type) -> list[Parameter]:
     return listed
 
 
-def from_mapping(cls: type[T], values: Mapping[str, Any], where: str = '') -> T:
-    """Build a parameter dataclass from a mapping (a YAML section); parameters that it lacks keep their default."""
+def from_mapping(cls: type[T], values: Any, where: str = '') -> T:
+    """Build a parameter dataclass from a mapping (a YAML section); parameters that it lacks keep their default.
+
+    Fields that are dataclasses, or mappings of names to these, are its sections. A number in place of a text is
+    converted to text: YAML reads a column named 3 as a number.
+    """
     if not (isinstance(cls, type) and dataclasses.is_dataclass(cls)):
         raise InvalidParameter(f'{where}: {cls!r} is not a class with parameters; name a dataclass')
-    return cls(**_read(cls, values, where, _checked))
-
-
-def _read(cls: type, values: Any, where: str, check: Callable[[Parameter, Any, str], Any]) -> dict[str, Any]:
-    """Return the checked values of a mapping for the parameters of a dataclass."""
     known = {parameter.name: parameter for parameter in parameters_of(cls)}
-    place = f'{where}: ' if where else ''
+    place, values = f'{where}: ' if where else '', {} if values is None else values
     if not isinstance(values, Mapping):
         raise InvalidParameter(f'{place}came {safe_repr(values)}; a mapping of parameter names to values is needed')
     for name in values:
         if name not in known:
             raise InvalidParameter(f'{place}{unknown_name(str(name), known, "parameter")}')
-    return {name: check(known[name], value, where) for name, value in values.items()}
-
-
-def _checked(parameter: Parameter, value: Any, where: str) -> Any:
-    try:
-        return parameter.check(value)
-    except InvalidParameter as error:
-        raise InvalidParameter(f'{where}: {error}' if where else str(error)) from error
-
-
-# --------------------
-# Read a tree of parameter dataclasses from a mapping (a YAML file): fields that are dataclasses are its sections.
-
-
-def tree_from_mapping(cls: type[T], values: Any, where: str) -> T:
-    """Build a dataclass whose fields are parameters, nested dataclasses, or mappings of names to these.
-
-    A number in place of a text is converted to text: YAML reads a column named 3 as a number.
-    """
-    read = _read(cls, {} if values is None else values, where, _value)
+    read = {name: _value(known[name], value, where) for name, value in values.items()}
     try:
         return cls(**read)
     except InvalidParameter as error:
-        raise InvalidParameter(f'{where}: {error}') from error
+        raise InvalidParameter(f'{place}{error}') from error
 
 
 def _value(parameter: Parameter, value: Any, where: str) -> Any:
     kind: Any = parameter.type
     if dataclasses.is_dataclass(kind):
-        return tree_from_mapping(kind, value, f'{where}, {parameter.name}')  # type: ignore[arg-type]
+        return from_mapping(kind, value, f'{where}, {parameter.name}')  # type: ignore[arg-type]
     if typing.get_origin(kind) in (Mapping, dict):
         return _values_by_name(parameter, value, where)
-    return _checked(parameter, _as_text(kind, value), where)
+    try:
+        return parameter.check(_as_text(kind, value))
+    except InvalidParameter as error:
+        raise InvalidParameter(f'{where}: {error}' if where else str(error)) from error
 
 
 def _values_by_name(parameter: Parameter, value: Any, where: str) -> dict[str, Any]:

@@ -130,13 +130,6 @@ def test_the_level_rises_and_falls_back_with_what_happens() -> None:
     assert levels == ['OK', 'OK', 'WARN', 'WARN', 'OK', 'WARN', 'WARN', 'ERROR', 'WARN', 'OK', 'ERROR', 'OK']
 
 
-def test_what_the_sensor_reports_of_itself_is_reported() -> None:
-    sensor = Scripted('')
-    sensor.details = {'serial number': 'A7'}
-    reader = SensorReader(sensor, lambda *_: None)
-    assert SensorHealth(reader, 0.0).report(1.0)[2]['serial number'] == 'A7'
-
-
 class TwoFingers(Scripted):
     """A sensor with two fingers on one line."""
 
@@ -291,9 +284,11 @@ def test_the_baseline_is_subtracted_only_if_wanted_and_known() -> None:
         assert watched.add('signal', stream.batch())[0].tared is subtract
 
 
-def test_what_was_lost_at_a_restart_is_named_unknown() -> None:
+def test_what_the_sensor_reports_is_reported_and_what_was_lost_at_a_restart_is_named_unknown() -> None:
     sensor, reader, _ = run('', 3)
+    sensor.details = {'serial number': 'A7'}
     health = SensorHealth(reader, 0.0)
-    assert 'lost at restarts' not in health.report(1.0)[2]
+    numbers = health.report(1.0)[2]
+    assert 'lost at restarts' not in numbers and numbers['serial number'] == 'A7'
     sensor.counts['device restarts'] = 1
     assert 'unknown' in health.report(2.0)[2]['lost at restarts']

@@ -68,6 +68,8 @@ def test_frames_read_at_once_are_one_batch_and_are_split_where_samples_are_missi
     batches = line.feed(data, START + round(1050 / 2500 * SECOND))['signal']
     assert [len(batch.samples) for batch in batches] == [20, 20]
     assert batches[1].first_sample - batches[0].first_sample == 30
+    counts = (batches[1].samples + 1.0) / 0.5  # as frames hold them
+    np.testing.assert_array_equal(counts, np.column_stack([np.arange(1030, 1050), -np.arange(1030, 1050)]))
 
 
 def test_sequence_and_time_wrap_without_a_trace():
@@ -177,25 +179,29 @@ OTHER = SimpleNamespace(device='/dev/ttyUSB0', vid=0x0403, pid=0x6001, serial_nu
 BOARD = SimpleNamespace(device='/dev/ttyS0', vid=None, pid=None, serial_number=None)
 
 
-@pytest.mark.parametrize('wanted', [NEW, OLD])
-def test_the_only_one_is_found_by_its_numbers(wanted):
-    assert resolve('auto', USB_IDS, 'TSF-85', lambda: [BOARD, OTHER, wanted]) == wanted.device
+@pytest.mark.parametrize(
+    ('device', 'listed', 'found'),
+    [
+        ('auto', [BOARD, OTHER, NEW], '/dev/ttyACM0'),
+        ('auto', [BOARD, OTHER, OLD], '/dev/ttyACM3'),
+        ('/dev/mine', [], '/dev/mine'),
+    ],
+)
+def test_a_path_is_taken_and_the_only_one_is_found_by_its_numbers(device, listed, found):
+    assert resolve(device, USB_IDS, 'TSF-85', lambda: listed) == found
 
 
-def test_a_path_is_taken_as_it_is():
-    assert resolve('/dev/mine', USB_IDS, 'TSF-85', lambda: []) == '/dev/mine'
-
-
-def test_when_there_is_none_the_ports_are_listed():
-    with pytest.raises(DeviceError, match=r'no TSF-85 \(16D0:14CC or 04B4:F232\).* none; plug it in'):
-        resolve('auto', USB_IDS, 'TSF-85', lambda: [])
-    with pytest.raises(DeviceError, match=r'are /dev/ttyS0, /dev/ttyUSB0 \(0403:6001\); plug it in'):
-        resolve('auto', USB_IDS, 'TSF-85', lambda: [OTHER, BOARD])
-
-
-def test_among_several_one_must_be_chosen():
-    with pytest.raises(DeviceError, match=r'any of 2 TSF-85s: /dev/ttyACM0, /dev/ttyACM3; set the parameter device'):
-        resolve('auto', USB_IDS, 'TSF-85', lambda: [OLD, NEW])
+@pytest.mark.parametrize(
+    ('listed', 'sentence'),
+    [
+        ([], r'no TSF-85 \(16D0:14CC or 04B4:F232\).* none; plug it in'),
+        ([OTHER, BOARD], r'are /dev/ttyS0, /dev/ttyUSB0 \(0403:6001\); plug it in'),
+        ([OLD, NEW], r'any of 2 TSF-85s: /dev/ttyACM0, /dev/ttyACM3; set the parameter device'),
+    ],
+)
+def test_where_none_or_several_are_there_the_ports_are_listed(listed, sentence):
+    with pytest.raises(DeviceError, match=sentence):
+        resolve('auto', USB_IDS, 'TSF-85', lambda: listed)
 
 
 def test_the_serial_number_is_that_of_the_port_behind_a_link(tmp_path):

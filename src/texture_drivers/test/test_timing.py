@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -254,28 +255,28 @@ def test_after_a_gap_the_index_is_that_of_the_time() -> None:
     np.testing.assert_allclose(after, samples[FACTOR * following :: FACTOR][: len(after)], atol=2e-3)
 
 
-def test_a_gap_in_the_stamps_is_a_gap_in_the_indices() -> None:
+@pytest.mark.parametrize(
+    ('stamps', 'indices', 'lost', 'damaged'),
+    [
+        ([10, 11, 15, 16], [0, 1, 5, 6], 3, 0),
+        ([10, 11, 12 + 2**40, 13, 14 - 8, 15, 16 + 256, 17], range(8), 0, 3),
+        ([65534, 65535, 0, 1, 4, 5], [0, 1, 2, 3, 6, 7], 2, 0),  # of 16 bits
+        ([round(i * 0.999) for i in range(10_000)], range(10_000), 0, 0),  # samples a trifle too fast
+    ],
+    ids=['gap', 'damaged', 'wrapped', 'too fast'],
+)
+def test_stamps_give_indices_losses_and_damages(
+    stamps: list[int | None], indices: Sequence[int], lost: int, damaged: int
+) -> None:
     counter = SampleCounter()
-    assert counter.place([10, 11, 15, 16])[0] == [0, 1, 5, 6]
-    assert counter.lost == 3
+    assert counter.place(stamps)[0] == list(indices)
+    assert (counter.lost, counter.damaged_stamps) == (lost, damaged)
 
 
 def test_an_odd_stamp_waits_for_the_next_one_to_explain_it() -> None:
     counter = SampleCounter()
     assert counter.place([10, 13])[0] == [0]
     assert counter.place([13, 14])[0] == [3, 4]
-
-
-def test_a_damaged_stamp_moves_no_index() -> None:
-    counter = SampleCounter()
-    assert counter.place([10, 11, 12 + 2**40, 13, 14 - 8, 15, 16 + 256, 17])[0] == list(range(8))
-    assert (counter.lost, counter.damaged_stamps) == (0, 3)
-
-
-def test_stamps_of_16_bits_wrap() -> None:
-    counter = SampleCounter()
-    assert counter.place([65534, 65535, 0, 1, 4, 5])[0] == [0, 1, 2, 3, 6, 7]
-    assert counter.lost == 2
 
 
 def test_a_device_that_counts_from_zero_again_is_noticed() -> None:
@@ -299,10 +300,3 @@ def test_the_stamps_themselves_show_how_many_ticks_a_sample_takes(ticks: int, ji
         indices, waiting = indices + placed, waiting[len(placed) :]
     assert indices == numbers
     assert (counter.lost, counter.damaged_stamps) == (7, 0)
-
-
-def test_a_device_that_samples_a_trifle_too_fast_loses_nothing() -> None:
-    counter = SampleCounter()
-    stamps = [round(i * 0.999) for i in range(10_000)]
-    assert counter.place(stamps)[0] == list(range(10_000))
-    assert counter.lost == 0

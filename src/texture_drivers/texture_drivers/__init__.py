@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Drivers of tactile sensors, from bytes to `TactileSignal`; the node `sensor` runs any of them.
 
-Data in: the bytes of a device, or a recorded file. Data out: `signal` and `signal_static`, fast and slow channels in
+Data in: the bytes of a device. Data out: `signal` and `signal_static`, fast and slow channels in
 the unit of the sensor, in batches of 5 to 20 ms; every lost sample is counted.
 
 ```python

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from texture_core.config import find_file, load_yaml, param, tree_from_mapping
+from texture_core.config import find_file, from_mapping, load_yaml, param
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.types import NANOSECONDS, Array, TactileSignal
 from texture_drivers.timing import ArrivalNumbering, RateMeter, SampleCounter, StreamClock
@@ -82,7 +82,7 @@ def load_mapping(name_or_path: str, finger: int = 0) -> AdaptorMapping:
     """Return a mapping that is shipped or written by a user, with {finger} and {place} filled in."""
     path = find_file(name_or_path, 'texture_drivers', 'config/adaptors', 'mapping')
     content = _filled(load_yaml(path, 'mapping'), {'{finger}': str(finger), '{place}': str(finger + 1)})
-    mapping = tree_from_mapping(AdaptorMapping, content, f"mapping '{path.stem}'")
+    mapping = from_mapping(AdaptorMapping, content, f"mapping '{path.stem}'")
     if not mapping.signals:
         raise InvalidParameter(f"mapping '{path.stem}' has no signals; name at least one")
     return mapping

@@ -12,7 +12,6 @@ from texture_drivers.anyskin import AnySkin
 from texture_drivers.biotac import LAYOUTS as BIOTACS
 from texture_drivers.biotac import BioTac
 from texture_drivers.daq import daq
-from texture_drivers.file import FilePlayer
 from texture_drivers.pvdf import pvdf
 from texture_drivers.sensor import SensorParams
 from texture_drivers.sound_card import SoundCard
@@ -34,5 +33,4 @@ SENSORS: Mapping[str, MakeSensor] = {
     'pvdf': pvdf,  # PVDF film and force sensor, Hu et al. 2014
     'anyskin': AnySkin,  # AnySkin and ReSkin: 5 magnetometers under a magnetic skin
     'sound_card': SoundCard,  # contact microphone or accelerometer on a sound card
-    'file': FilePlayer,  # a recording: CSV, WAV, NumPy
 }

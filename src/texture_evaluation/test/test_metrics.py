@@ -29,10 +29,6 @@ def slide(
 RESULTS = [slide('a', 'abaaaa'), slide('b', 'aaabbb')]
 
 
-def test_window_accuracy_counts_every_window() -> None:
-    assert metrics.window_accuracy(RESULTS) == pytest.approx(8 / 12)
-
-
 @pytest.mark.parametrize(('seconds', 'accuracy'), [(0.5, 0.5), (0.6, 0.0), (0.64, 0.0), (0.7, 0.5), (1.0, 1.0)])
 def test_accuracy_at_a_time_is_that_of_the_last_decision_by_then(seconds: float, accuracy: float) -> None:
     assert metrics.accuracy_at(RESULTS, seconds) == pytest.approx(accuracy)

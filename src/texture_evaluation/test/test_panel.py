@@ -1,7 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 import json
-import os
 from pathlib import Path
 
 import numpy as np
@@ -19,10 +18,6 @@ from texture_evaluation.panel import (
     write_panel,
 )
 
-DATA = (
-    Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
-    / 'roughness_ratings'
-)
 # Shrout & Fleiss 1979, table 2: six targets, four classifies; the ICCs of table 4.
 SHROUT_FLEISS = np.array(
     [[9, 2, 5, 8], [6, 1, 3, 2], [8, 4, 6, 8], [7, 1, 2, 6], [10, 5, 6, 9], [6, 2, 4, 7]], dtype=float
@@ -128,8 +123,7 @@ def test_a_missing_file_and_a_scale_upside_down_get_a_sentence(tmp_path: Path) -
         read_ratings(write(tmp_path / 'r.csv', 'rater,texture,grade', 'a,cork,1'), (5.0, 1.0))
 
 
-@pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
-def test_the_viper_panel_agrees_as_published() -> None:
-    found = agreement(read_ratings(DATA / 'viper_roughness.csv', (0.0, 10.0)).grades)
+def test_the_viper_panel_agrees_as_published(data: Path) -> None:
+    found = agreement(read_ratings(data / 'roughness_ratings' / 'viper_roughness.csv', (0.0, 10.0)).grades)
     assert found['one_against_rest_r'] == pytest.approx(0.60, abs=0.005)
     assert found['one_against_rest_error'] == pytest.approx(0.82, abs=0.005)

@@ -102,13 +102,3 @@ def test_what_changes_together_is_recognised_on_a_day_with_other_levels(name: st
     levels = Recipe.from_mapping({'inputs': features, 'learner': 'discriminant'}, 'levels')
     guessed = evaluate_dataset(train(levels, training_examples(levels, trained)), tested)
     assert window_accuracy(guessed.known) < 0.8
-
-
-def test_offline_training_and_evaluation_tell_a_baseline_that_the_recipe_does_not_expect() -> None:
-    made = slides_of_days((0,))
-    assert made.tare_faults(load_recipe('taxels-any-day').feature_set) == []
-    raw = SlideDataset.from_arrays(
-        {'signal_static': [np.ones((100, 4))]}, ['cork'], {'signal_static': 50.0}, sensor='skin'
-    )
-    (fault,) = raw.tare_faults(load_recipe('taxels-any-day').feature_set)
-    assert "expects 'signal_static' tared" in fault

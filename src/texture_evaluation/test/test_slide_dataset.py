@@ -7,12 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_core.errors import InvalidData, ModelMismatch
+from texture_core.errors import InvalidData
 from texture_core.types import NANOSECONDS, ExplorationState, Phase, SlideMotion, TactileSignal
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.evaluate import evaluate
 from texture_evaluation.train import train_from_bags
-from texture_features.augmentation import Augmentation
 from texture_features.feature_set import FeatureSet
 from texture_features.windows import CutWindow, WindowParams, cut_recording
 from texture_recordings.bags import BagWriter, read_bag
@@ -102,12 +101,6 @@ def test_each_slide_has_its_conditions(condition: str, expected: list) -> None:
     assert from_arrays(sensor='finger', session='monday').condition(condition).tolist() == expected
 
 
-def test_a_missing_input_is_refused_with_what_there_is() -> None:
-    other = FeatureSet.from_mapping({'inputs': {'signal_static': {'features': ['mean']}}})
-    with pytest.raises(ModelMismatch, match=r"slide 'cork/1' .* has no 'signal_static', only signal"):
-        from_arrays().features(other)
-
-
 @pytest.mark.parametrize(
     ('arguments', 'sentence'),
     [
@@ -136,19 +129,6 @@ def test_lost_samples_leave_windows_out_but_are_refused_where_all_are_needed(tmp
     assert starts == [0, NANOSECONDS, 3 * NANOSECONDS // 2]
     with pytest.raises(InvalidData, match='has lost samples'):
         dataset.to_numpy()
-
-
-def test_augmented_features_hold_copies_of_every_slide_and_the_windows_stay_the_same() -> None:
-    rng = np.random.default_rng(0)
-    arrays = {'signal': [rng.normal(size=(3000, 1)) for _ in range(4)]}
-    dataset = SlideDataset.from_arrays(arrays, ['cork', 'cork', 'felt', 'felt'], {'signal': 1000.0})
-    features = load_recipe('default').feature_set
-    augmented, plain = dataset.features(features, Augmentation(copies=2)), dataset.features(features)
-    np.testing.assert_array_equal(augmented.values, plain.values)
-    assert augmented.augmented is not None
-    assert set(augmented.augmented.copies.groups.tolist()) == {'cork/1', 'cork/2', 'felt/1', 'felt/2'}
-    assert augmented.augmented.gain_response[:32] == pytest.approx(np.full(32, 2.0))  # logarithms of powers
-    assert plain.augmented is None
 
 
 def test_windows_over_distances_show_as_much_of_a_surface_at_every_speed() -> None:

@@ -8,7 +8,7 @@ import asyncio
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -312,7 +312,6 @@ class PairedComparison:
     only_first: int
     only_second: int
     p_value: float
-    p_value_adjusted: float
     slide_difference: float
     slide_interval: tuple[float, float]
     window_difference: float
@@ -359,24 +358,9 @@ def compare(first: CrossValidation, second: CrossValidation) -> PairedComparison
     slide_difference, slide_interval = _difference(right)
     window_difference, window_interval = _difference(windows)
     return PairedComparison(
-        first.recipe, second.recipe, len(slides), right.shape[1], only_first, only_second, p_value, p_value,
+        first.recipe, second.recipe, len(slides), right.shape[1], only_first, only_second, p_value,
         slide_difference, slide_interval, window_difference, window_interval,
     )  # fmt: skip
-
-
-def compare_all(results: Sequence[CrossValidation]) -> list[PairedComparison]:
-    """Compare each recipe with the first, the p values adjusted for their number.
-
-    Source: Holm 1979, "A simple sequentially rejective multiple test procedure".
-    """
-    compared = [compare(results[0], other) for other in results[1:]]
-    order = np.argsort([one.p_value for one in compared], kind='stable')
-    adjusted, least = [1.0] * len(compared), 0.0
-    for rank, index in enumerate(order.tolist()):
-        # A larger p value never gets a smaller adjusted one.
-        least = max(least, min(1.0, (len(compared) - rank) * compared[index].p_value))
-        adjusted[index] = least
-    return [replace(one, p_value_adjusted=p_value) for one, p_value in zip(compared, adjusted, strict=True)]
 
 
 def mcnemar(only_first: int, only_second: int) -> float:

@@ -204,7 +204,7 @@ def sentence(one: PairedComparison) -> str:
     return (
         f"'{one.second}' against '{one.first}' on {one.n_slides} slides: slides {slides}, windows {windows}; "
         f'{one.only_second} slides are correct by it only, {one.only_first} by the other only: '
-        f'p = {one.p_value:.2g} ({test}), {one.p_value_adjusted:.2g} adjusted for all comparisons (Holm)'
+        f'p = {one.p_value:.2g} ({test})'
     )
 
 

@@ -16,7 +16,7 @@ from texture_features.windows import CutWindow, SlideEnd
 RECIPE = {
     'windows': {'length_s': 0.5, 'hop_s': 0.25},
     'inputs': {
-        'signal': {'features': [{'log_bands': {'bands': 16}}, 'hjorth', 'speed']},
+        'signal': {'features': [{'mean_log_bands': {'bands': 16}}, 'hjorth', 'speed']},
         'signal_static': {'features': ['mean', 'log_variance']},
     },
 }
@@ -33,7 +33,7 @@ def cut(seed=0, rate_hz=1000.0, channels=('dynamic',)):
 
 def test_values_have_the_names_of_their_origin():
     vector = FeatureSet.from_mapping(RECIPE).extract(cut())
-    assert vector.names[0] == 'signal/log_bands/1/dynamic'
+    assert vector.names[0] == 'signal/mean_log_bands/1/dynamic'
     assert vector.names[16:20] == (
         'signal/hjorth/log_activity/dynamic',
         'signal/hjorth/mobility/dynamic',
@@ -105,7 +105,7 @@ def test_recipes_are_found_by_name_and_by_path(tmp_path):
         ({'inputs': {'signal': {'features': [], 'rate': 3}}}, "list under 'features'"),
         ({'inputs': {'signal': {'features': ['hjort']}}}, "did you mean 'hjorth'"),
         ({'inputs': {'signal': {'features': [{'log_variance': {'flor': 1}}]}}}, "did you mean 'floor'"),
-        ({'inputs': {'signal': {'features': [{'log_bands': {'bands': 1}}]}}}, '2 to 512'),
+        ({'inputs': {'signal': {'features': [{'mean_log_bands': {'bands': 1}}]}}}, '2 to 512'),
         ({'inputs': {'signal': {'features': ['hjorth', 'hjorth']}}}, 'twice'),
         ({'inputs': {'signal': {'features': ['hjorth']}}, 'windows': {'length_s': 0}}, 'at least|0.005 to'),
         ({'inputs': {'a': {'tare': 'maybe', 'features': ['hjorth']}}}, 'tare'),

@@ -64,7 +64,6 @@ def test_any_finite_window_gives_finite_values(name, samples):
 # How the values of a signal follow from those of one 1000 times as weak; the rest does not follow such a rule.
 SAME, TIMES, SHIFTED = 'the same', 'times 1000', 'plus log 1000 squared'
 SCALING = {
-    'log_bands': SHIFTED,
     'mean_log_bands': SHIFTED,
     'low_fft_bins': SHIFTED,
     'log_variance': SHIFTED,
@@ -113,7 +112,6 @@ def test_empty_windows_are_refused(shape):
 @pytest.mark.parametrize(
     'name',
     [
-        'log_bands',
         'mean_log_bands',
         'low_fft_bins',
         'hjorth',

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from texture_core.errors import InvalidData
 from texture_core.types import NANOSECONDS, Phase, TactileSignal
 from texture_features.segmentation import SegmentationParams, find_sliding, segment_recording
 
@@ -69,23 +68,10 @@ def test_a_few_lost_samples_and_gain_and_offset_of_the_sensor_do_not_matter():
         np.testing.assert_allclose(found, plain, atol=0.006)
 
 
-def test_a_wrong_shape_gets_one_sentence():
-    with pytest.raises(InvalidData, match='at a rate above 0'):
-        find_sliding(np.zeros(100), RATE_HZ, SegmentationParams())
-
-
 def spans(states):
     """Return (start, end) of each slide by its states, s from the beginning."""
     assert [state.phase for state in states] == [Phase.SLIDE, Phase.LIFT] * (len(states) // 2)
     return np.reshape([(state.stamp_ns - START_NS) / NANOSECONDS for state in states], (-1, 2))
-
-
-def test_slides_of_a_recording_are_found_with_their_starts_and_ends():
-    slides = ((1.0, 2.5), (4.0, 5.0))
-    states = segment_recording(batches(recording(slides, 6.5), RATE_HZ), SegmentationParams())
-    np.testing.assert_allclose(spans(states), slides, atol=0.06)
-    guaranteed_s = [state.steady_s for state in states if state.phase is Phase.SLIDE]
-    np.testing.assert_allclose(guaranteed_s, np.diff(spans(states))[:, 0], atol=1e-8)
 
 
 def test_a_sensor_that_restarts_and_one_that_is_silent_are_survived():

@@ -3,7 +3,7 @@
 """Windows of a tactile signal and the features that describe them.
 
 Data in: `TactileSignal`s of any rate and number of channels, and `ExplorationState`s with the times of sliding.
-Data out: a `FeatureVector` per window, with names such as `signal/log_bands/12/dynamic` (input, feature, value,
+Data out: a `FeatureVector` per window, with names such as `signal/mean_log_bands/12/dynamic` (input, feature, value,
 channel). The node and the offline functions give the same numbers to the last bit.
 
 ```python

@@ -43,8 +43,7 @@ from texture_features.windows import (
 # The features that a recipe can name.
 
 FEATURES: Mapping[str, type[Feature]] = {
-    'log_bands': spectral.LogBands,  # Welch 1967
-    'mean_log_bands': spectral.MeanLogBands,
+    'mean_log_bands': spectral.MeanLogBands,  # Welch 1967
     'low_fft_bins': spectral.LowFftBins,
     'hjorth': temporal.Hjorth,  # Hjorth 1970; Kaboli et al. 2015
     'moments': temporal.Moments,
@@ -306,7 +305,7 @@ class FeatureSet:
         return vectors
 
     def names(self, layout: InputLayout) -> tuple[str, ...]:
-        """Return the name of each value, given (rate, channels) of each input: 'signal/log_bands/12/dynamic'."""
+        """Return the name of each value, given (rate, channels) of each input: 'signal/mean_log_bands/12/dynamic'."""
         return self._names_and_fingerprint(layout)[0]
 
     def fingerprint(self, layout: InputLayout) -> str:

@@ -12,7 +12,6 @@ from scipy.ndimage import percentile_filter, uniform_filter1d
 from scipy.signal import savgol_filter
 
 from texture_core.config import param
-from texture_core.errors import InvalidData
 from texture_core.types import NANOSECONDS, Array, ExplorationState, Phase, Samples, TactileSignal
 from texture_features.windows import SampleBuffer
 
@@ -50,11 +49,6 @@ class SegmentationParams:
 
 def cell_power(samples: Samples, rate_hz: float) -> Array:
     """Return the power of the vibration in cells of 5 ms, (n_cells, n_channels); what is not finite has none."""
-    if samples.ndim != 2 or not rate_hz > 0:
-        raise InvalidData(
-            f'sliding is looked for in samples of shape {samples.shape} at {rate_hz} Hz; (n_samples, n_channels) at a '
-            'rate above 0 is needed'
-        )
     width, smoothed = max(1, round(CELL_S * rate_hz)), max(2 * round(0.5 * SMOOTH_S * rate_hz) + 1, SMOOTH_ORDER + 2)
     known = np.isfinite(samples)
     vibration = np.where(known, samples, 0.0)

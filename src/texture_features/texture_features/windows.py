@@ -357,8 +357,8 @@ class SampleBuffer:
 class BufferedStream:
     """The runs of one topic: a new one begins when the numbering restarts or the rate or channels change.
 
-    One that ended is kept as long as a sample, and no more than `MAX_BUFFERS` are. It also holds what a cutter waits
-    for: `due`, the index before whose arrival nothing can happen, and where slides begin in the buffers, `anchors`.
+    One that ended is kept as long as a sample, and no more than `MAX_BUFFERS` are. It also holds where slides begin in
+    the buffers, `anchors`.
     """
 
     MAX_BUFFERS = 4
@@ -367,22 +367,20 @@ class BufferedStream:
         self.buffers: deque[SampleBuffer] = deque(maxlen=self.MAX_BUFFERS)
         self.lost_samples = 0
         self.restarts = 0
-        self.due = -math.inf
         self.received = False
         self.received_s = math.nan
         self.anchors: dict[SampleBuffer, tuple[int, int]] = {}
         self._keep_s = keep_s
 
-    def add(self, signal: TactileSignal) -> bool:
-        """Add a batch; return whether it began a new run."""
+    def add(self, signal: TactileSignal) -> None:
+        """Add a batch."""
         while len(self.buffers) > 1 and signal.stamp_ns - self.buffers[0].end_ns > self._keep_s * NANOSECONDS:
             self.buffers.popleft()
         if self.buffers and self.buffers[-1].continued_by(signal):
             self.lost_samples += self.buffers[-1].append(signal)
-            return False
+            return
         self.restarts += bool(self.buffers)
         self.buffers.append(SampleBuffer(signal, self._keep_s))
-        return True
 
 
 # --------------------
@@ -632,17 +630,14 @@ class WindowCutter:
         self._windows = 0
         self._skipped = 0
         self._old_states = 0
-        self._lost = 1  # windows from the present one on that are lost for the same reason
 
     def add_signal(self, topic: str, signal: TactileSignal) -> None:
         """Add a batch; batches of one topic come in the order in which they were sampled."""
         source = self._inputs.get(topic)
         if source is None or not len(signal.samples):
             return
-        restarted = source.add(signal)
-        source.received = True
-        if restarted or signal.next_sample >= source.due:
-            self._ready = True
+        source.add(signal)
+        source.received = self._ready = True
 
     def add_state(self, state: ExplorationState) -> None:
         """Add a state; states come in the order in which they were published."""
@@ -676,8 +671,7 @@ class WindowCutter:
         for source in self._inputs.values():
             if source.received or math.isnan(source.received_s):
                 source.received, source.received_s = False, now_s
-        awaited = [source for source in self._inputs.values() if source.due < math.inf]
-        silent = any(now_s - source.received_s >= LATE_SAMPLES_S for source in awaited)
+        silent = any(now_s - source.received_s >= LATE_SAMPLES_S for source in self._inputs.values())
         return events + (self._give_up() if silent else [])
 
     def finish(self) -> list[WindowEvent]:
@@ -717,14 +711,12 @@ class WindowCutter:
 
     def _cut(self, slide: SlideCoverage, events: list[WindowEvent]) -> bool:
         """Cut what can be cut of a slide; return whether it is used up."""
-        for source in self._inputs.values():
-            source.due = math.inf
         while span := slide.window():
             found = self._find(slide, span)
             if found is _Missing.LATE:
                 return False
             if isinstance(found, _Missing):
-                self._skip(slide, self._lost)
+                self._skip(slide, 1)
                 continue
             slide.advance()
             event: CutWindow | None = CutWindow(
@@ -749,7 +741,6 @@ class WindowCutter:
         return slide.ended
 
     def _find(self, slide: SlideCoverage, span: CoveredSpan) -> dict[str, Window] | _Missing:
-        self._lost = 1
         windows = {}
         for topic, source in self._inputs.items():
             found = self._find_in(source, slide, span)
@@ -760,32 +751,22 @@ class WindowCutter:
 
     def _find_in(self, source: BufferedStream, slide: SlideCoverage, span: CoveredSpan) -> Window | _Missing:
         """Look for a window in the runs of a stream; only the newest can still grow."""
-        source.due = -math.inf
-        state, lost = _Missing.LATE, ALL
+        state = _Missing.LATE
         for buffer in source.buffers:
             anchor = source.anchors.get(buffer) or buffer.anchor(slide.start_ns)
             if anchor is None:
-                state, source.due = _Missing.LATE, -math.inf
+                state = _Missing.LATE
                 continue
             source.anchors[buffer] = anchor
             first = buffer.index_at(span.start_ns, anchor)
             count = max(1, round(self._params.length_s * buffer.rate_hz))
             if first >= buffer.first_sample and first + count <= buffer.next_sample:
-                source.due = math.inf
                 samples = buffer.take(first, count)
                 if not np.isfinite(samples).all():
                     return _Missing.LOST
                 rate_hz, names, sensor = buffer.rate_hz, buffer.channels, buffer.sensor
                 return Window(samples, rate_hz, names, span.start_ns, span.speed_m_s, span.force_n, sensor)
             state = _Missing.LOST if first < buffer.first_sample else _Missing.LATE
-            source.due = first + count
-            if state is _Missing.LOST:
-                # What begins before the first sample is lost: a gap of an hour is passed over at once.
-                missing_s = (buffer.first_sample - first - 1) / buffer.rate_hz
-                lost = min(lost, int(missing_s / self._params.hop_s))
-        if state is _Missing.LOST:
-            source.due = math.inf
-            self._lost = max(1, lost)
         return state
 
     def _skip(self, slide: SlideCoverage, count: int) -> None:

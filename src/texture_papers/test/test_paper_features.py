@@ -7,10 +7,9 @@ import pytest
 from scipy import signal as scipy_signal
 from scipy import stats
 
-from texture_core.types import Window
-from texture_features.feature_set import FEATURES, FeatureSet
+from texture_features.feature_set import FeatureSet
 from texture_features.features.spectral import hann, long_densities
-from texture_features.windows import CutWindow, WindowBatch
+from texture_features.windows import WindowBatch
 from texture_papers.hu import Spectrum
 from texture_papers.jamali import MeanAmplitude, RegionPeaks, region_peaks
 from texture_papers.kaboli import Correlation, MeanHjorth, cell_means
@@ -125,17 +124,7 @@ def test_cells_share_all_samples_though_rates_are_no_multiples():
     np.testing.assert_allclose(cells[0], np.arange(30) * 500 / 30 + 8.0, atol=1.01)
 
 
-SLOW = ('tdc', 'tac', 'pdc', 'electrode1', 'electrode2')
 BIOTAC = ('tdc', 'tac', 'pdc', *(f'electrode{number}' for number in range(1, 20)))
-
-
-def test_means_may_leave_channels_out_so_that_electrodes_alone_count():
-    samples = noise(200, 5) * np.array([50.0, 90.0, 30.0, 1.0, 2.0])
-    named = WindowBatch(samples, 100.0, channels=SLOW)
-    each = FEATURES['hjorth'](log_activity=False)(windows(samples))
-    electrodes = MeanHjorth(log_activity=False, omit='tdc tac pdc')(named)[0]
-    np.testing.assert_allclose(electrodes, each[3:].mean(axis=0))
-    np.testing.assert_allclose(MeanHjorth(log_activity=False)(named)[0], each.mean(axis=0))
 
 
 def test_the_recipes_of_kaboli_take_the_19_electrodes_of_a_biotac_alone():
@@ -196,29 +185,3 @@ def test_integral_and_arc_length_have_their_closed_forms():
     ramp = np.arange(11.0)[:, None] * 3.0
     line = WindowBatch(ramp, rate_hz=0.25)  # steps of 4 s and 3 units: 5 long
     assert ArcLength()(line)[0, 0] == pytest.approx(50.0)
-
-
-def test_joined_inputs_see_both_windows_and_are_cut_from_both_topics():
-    recipe = {
-        'inputs': {
-            'finger1/signal': {'features': ['hjorth']},
-            'finger1/signal_static': {'features': ['texture_papers.kaboli:MeanHjorth']},
-            'finger1/signal+finger1/signal_static': {'features': ['texture_papers.kaboli:Correlation']},
-        }
-    }
-    feature_set = FeatureSet.from_mapping(recipe)
-    assert feature_set.topics == ('finger1/signal', 'finger1/signal_static')
-    rng = np.random.default_rng(0)
-    windows = {
-        'finger1/signal': Window(rng.normal(size=(500, 1)), 1000.0, ('pac',)),
-        'finger1/signal_static': Window(rng.normal(size=(50, 19)), 100.0, tuple(map(str, range(19)))),
-    }
-    events = [CutWindow(0, 'e', 0.5, 0.1, windows, speed_m_s=0.1)] * 2
-    vector = feature_set.extract_many(events)[1]
-    assert vector.names[-2:] == tuple(
-        f'finger1/signal+finger1/signal_static/texture_papers.kaboli:Correlation/{kind}'
-        for kind in ('pearson', 'spearman')
-    )
-    assert len(vector.names) == 8
-    np.testing.assert_array_equal(vector.values, feature_set.extract(events[0]).values)
-    assert FeatureSet.from_mapping(feature_set.as_mapping()) == feature_set

@@ -291,6 +291,17 @@ class Experiment:
     jobs: int = 1
 
 
+CPU_INFO = Path('/proc/cpuinfo')
+
+
+def machine() -> str:
+    """Return the processor, how many of its cores there are, and the Python in use."""
+    lines = CPU_INFO.read_text(encoding='utf-8', errors='replace').splitlines() if CPU_INFO.exists() else []
+    models = [line.partition(':')[2].strip() for line in lines if line.startswith('model name')]
+    model = models[0] if models else platform.machine()
+    return f'{model}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}'
+
+
 @dataclass(frozen=True)
 class ExperimentResult:
     """The numbers of one experiment, and what was measured on what."""
@@ -335,7 +346,7 @@ class ExperimentResult:
             'measured': self.measured,
             'data': self.data,
             'split': self.split,
-            'machine': f'{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}',
+            'machine': machine(),
             'numbers': self.numbers,
             'charts': [chart.name for chart in self.charts],
         }

@@ -380,8 +380,8 @@ def _leave_one_out(simulated: SimulatedTextures, recipe: RoughnessRecipe) -> Ans
     parts = []
     for texture in simulated.textures[:: QUICK_STEP if simulated.quick and recipe.name != OURS else 1]:
         held = examples.labels == texture
-        model = train_grades(_quickly(recipe, simulated), _rows(examples, ~held), simulated.grades)
-        parts.append(simulated.ask(model, _rows(examples, held)))
+        model = train_grades(_quickly(recipe, simulated), examples.take(~held), simulated.grades)
+        parts.append(simulated.ask(model, examples.take(held)))
     return Answers.joined(parts)
 
 
@@ -392,14 +392,10 @@ def _quickly(recipe: RoughnessRecipe, simulated: SimulatedTextures) -> Roughness
     return replace(recipe, training=replace(recipe.training, folds=2))
 
 
-def _rows(examples: LabelledFeatures, rows: Any) -> LabelledFeatures:
-    return replace(examples, values=examples.values[rows], labels=examples.labels[rows], groups=examples.groups[rows])
-
-
 def _thinned(examples: LabelledFeatures, count: int) -> LabelledFeatures:
     """Return the first `count` windows of each texture."""
     kept = np.concatenate([np.flatnonzero(examples.labels == name)[:count] for name in dict.fromkeys(examples.labels)])
-    return _rows(examples, kept)
+    return examples.take(kept)
 
 
 def _chart(textures: Sequence[str], answers: Mapping[str, Mapping[str, Answers]], out: Path) -> Path:

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from texture_core.config import find_file, load_yaml, param, tree_from_mapping, unknown_name
+from texture_core.config import find_file, from_mapping, load_yaml, param, unknown_name
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.types import MAX_HZ, MIN_HZ
 from texture_recordings.slides import STREAMS
@@ -239,4 +239,4 @@ def load_mapping(name_or_path: str | Path) -> TableMapping:
 
 def mapping_from(content: object, where: str = 'mapping') -> TableMapping:
     """Return the mapping that plain values describe; InvalidParameter if they are unknown or impossible."""
-    return tree_from_mapping(TableMapping, content, where)
+    return from_mapping(TableMapping, content, where)

@@ -91,13 +91,6 @@ def test_the_goal_current_bounds_the_force_however_stiff_the_object(bus, stiffne
     assert read(bus, 1, 126, '<h') == 200
 
 
-def test_a_free_motor_goes_to_its_goal(bus):
-    for address, value, size in ((84, 600, 2), (102, 300, 2), (116, 1948, 4), (64, 1, 1)):
-        bus.receive(write(2, address, value, size))
-    bus.motors.advance(2000)
-    assert read(bus, 2, 132, '<i') == 1948
-
-
 ALERT, RANGE, LENGTH, LIMIT, ACCESS = 0x80, 4, 5, 6, 7
 S = 2000  # steps of the mechanics in a second
 

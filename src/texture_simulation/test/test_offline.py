@@ -5,21 +5,15 @@ from __future__ import annotations
 
 import itertools
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from texture_core.types import NANOSECONDS, FingerState, Phase, lost_samples
 from texture_drivers import tsf85 as tables
-from texture_recordings.bags import read_bag
-from texture_recordings.slides import find_slides
 from texture_simulation.offline import (
-    SlidePlan,
     simulate_exploration,
     simulate_slide_streams,
-    simulate_slides,
-    write_simulated,
 )
 from texture_simulation.path import FingerTrack, SimulatedSlide
 from texture_simulation.scene import load_scene, scene_from
@@ -73,24 +67,10 @@ def test_a_circle_meets_the_ridges_at_all_angles() -> None:
     assert np.isfinite(np.concatenate([batch.samples for batch in signals['signal']])).all()
 
 
-def test_each_surface_has_its_slides_without_a_loss(tmp_path: Path) -> None:
-    plan = SlidePlan(slides=2, slide_s=0.5)
-    bags = write_simulated(tmp_path, plan, np.random.default_rng(0), surfaces=('leather', 'glass'))
-    assert [(s.surface, s.number) for s in find_slides(bags)] == [
-        ('leather', 1),
-        ('leather', 2),
-        ('glass', 1),
-        ('glass', 2),
-    ]
-    for topic in ('signal', 'signal_static'):
-        assert lost_samples([signal for _, _, signal in read_bag(bags[0], (topic,))]) == 0
-
-
 TABLE = {
     'surfaces': {'rough': [{'kind': 'self_affine', 'seed': 5}], 'flat': []},
     'effects': {'noise': {'fast_count': 20.0, 'slow_count': 5.0}, 'slide_error': {}, 'unevenness': {}},
 }
-PAPERS = ('ets_linear', 'ets_circular', 'ets_fine', 'roughness', 'jamali', 'kaboli', 'hu')
 
 
 def table(sensor: str):
@@ -115,27 +95,6 @@ def test_a_seed_is_one_set_of_scans_and_a_finger_keeps_its_traits(sensor: str) -
     topics = measured(1)
     assert all(np.array_equal(topics[topic], measured(1)[topic]) for topic in topics)
     assert not np.array_equal(measured(1)['signal'], measured(2)['signal'])
-
-
-def test_speed_force_and_direction_may_differ_from_scan_to_scan() -> None:
-    ridges = {'ridges': [{'kind': 'grating', 'pitch_m': 2e-3, 'depth_m': 1e-4}]}
-    scene = scene_from('test', {'surfaces': ridges})
-    speed, angle = np.array([0.1, 0.2, 0.2]), np.array([0.0, 0.0, np.pi / 3])
-    measured = simulate_slides(scene, 'ridges', 3, SimulatedSlide(speed, 2.0, 1.0, angle), np.random.default_rng(0))[
-        ..., 0
-    ]
-    lines = np.abs(np.fft.rfft(measured * np.hanning(1000), axis=1)).argmax(axis=1)
-    assert lines == pytest.approx(speed * np.cos(angle) / 2e-3, abs=1)
-
-
-@pytest.mark.parametrize('name', PAPERS)
-def test_every_surface_of_every_paper_can_be_measured(name: str) -> None:
-    scene = load_scene(name)
-    rng = np.random.default_rng(0)
-    for surface in scene.surfaces:
-        measured = simulate_slides(scene, surface, 1, SimulatedSlide(0.1, 2.0, 0.1), rng)
-        assert np.isfinite(measured).all()
-        assert measured.std() > 0
 
 
 MS = NANOSECONDS // 1000

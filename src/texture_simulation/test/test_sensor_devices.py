@@ -4,9 +4,7 @@
 
 from __future__ import annotations
 
-import os
 import re
-import tty
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
@@ -16,12 +14,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sensor_rig import CASES, Feed, Rig, biotac, counting
+from sensor_rig import CASES, Rig, biotac, counting
 
 from texture_core.types import lost_samples
 from texture_drivers.biotac import BioTac
 from texture_drivers.sensor import SensorParams
-from texture_simulation.devices.fingers import ByteFaults, EmulatedBioTac, EmulatedTsf85
+from texture_simulation.devices.fingers import ByteFaults, EmulatedBioTac, EmulatedDaq
 
 pytestmark = pytest.mark.realtime
 
@@ -92,16 +90,6 @@ def test_a_rate_that_nobody_set_is_measured_and_kept(open_rig: Make) -> None:
     assert again.sampling_rate_hz == first.sampling_rate_hz == rig.sensor.expected_rates_hz['signal']
 
 
-def test_the_channels_keep_their_order(open_rig: Make) -> None:
-    def feed(device: Any, first: int, ticks: int) -> None:
-        counts = counting(first, ticks, 30_000, 8, 1) * np.array([1, 0, 0, 0, 0, 0, 0, -1])[:, None]
-        device.measure({'signal': counts})
-
-    last = open_rig('daq', feed=feed).signal_s(0.5)[-1]
-    assert last.samples[0, 0] > 0
-    np.testing.assert_array_equal(last.samples[:, 7], -last.samples[:, 0])
-
-
 @pytest.mark.parametrize(
     ('name', 'silence', 'other', 'babble'),
     [
@@ -120,74 +108,13 @@ def test_a_silent_device_and_one_that_sends_other_bytes_have_different_reports(
     assert re.search(babble, rig.fault())
 
 
-def swing(device: Any, first: int, ticks: int) -> None:
-    """Feed a film that swings at 50 Hz, and a force that rises."""
-    numbers = np.arange(first, first + ticks)[:, None, None]
-    film = 1000 * np.sin(2 * np.pi * 50 / 4096 * numbers)
-    device.measure({'signal': film, 'signal_static': numbers[numbers[:, 0, 0] % 64 == 0] // 64 % 3000})
-
-
-SWING: dict[str, Feed] = {'feed': swing}
-
-
-def test_film_and_force_come_as_two_streams_in_their_units(open_rig: Make) -> None:
-    topics = open_rig('pvdf', config='', **SWING).read_s(1.0)
-    film, force = topics['signal'], topics['signal_static']
-    assert lost_samples(film) == lost_samples(force) == 0
-    assert (film[0].sensor, film[0].units, film[0].sampling_rate_hz) == ('pvdf/film', ('pC',), 4096.0)
-    assert (force[0].sensor, force[0].units, force[0].sampling_rate_hz) == ('pvdf/force', ('N',), 64.0)
-    charge = np.concatenate([batch.samples for batch in film])
-    assert charge.max() == pytest.approx(2.0, rel=0.01)  # 1000 counts of 0.002 pC
-    assert np.diff(np.concatenate([batch.samples for batch in force]), axis=0) == pytest.approx(0.005, abs=1e-6)
-
-
-TEN_MS = {'signal': np.arange(10)[:, None, None], 'signal_static': np.empty((0, 28, 1))}
-START, STOP = bytes.fromhex('9A 00 58 01 01'), bytes.fromhex('9A 00 58 01 00')
-
-
-@pytest.fixture
-def device(tmp_path: Path) -> Iterator[EmulatedTsf85]:
-    made = EmulatedTsf85(tmp_path / 'new' / 'tsf85', np.random.default_rng(0))
-    made.plug()
-    yield made
-    made.unplug()
-
-
-class Host:
-    def __init__(self, link: Path) -> None:
-        self.end = os.open(link, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-        tty.setraw(self.end)
-
-    def read(self) -> bytes:
-        try:
-            return os.read(self.end, 100_000)
-        except BlockingIOError:
-            return b''
-
-
-@pytest.fixture
-def host(tmp_path: Path, device: EmulatedTsf85) -> Iterator[Host]:
-    made = Host(tmp_path / 'new' / 'tsf85')
-    yield made
-    os.close(made.end)
-
-
-def test_it_streams_from_start_to_stop_only(device: EmulatedTsf85, host: Host) -> None:
-    device.measure(TEN_MS)
-    assert host.read() == b''
-    os.write(host.end, START)
-    device.measure(TEN_MS)
-    assert host.read().count(b'\x9a\x00\x58') == 10
-    os.write(host.end, STOP)
-    device.measure(TEN_MS)
-    assert host.read() == b''
-
-
-def test_it_never_waits_for_a_host_that_does_not_read(device: EmulatedTsf85, host: Host) -> None:
-    os.write(host.end, START)
-    for _ in range(200):
-        device.measure(TEN_MS)
+def test_a_device_never_waits_for_a_host_that_does_not_read(tmp_path: Path) -> None:
+    device = EmulatedDaq(tmp_path / 'new' / 'daq', np.random.default_rng(0))
+    device.plug()
+    for first in range(0, 5000, 100):
+        device.measure({'signal': counting(first, 100, 30_000, 8, 1)})
     assert device.dropped_bytes > 50_000
+    device.unplug()
 
 
 def test_the_public_client_of_the_vendor_reads_each_packet_of_the_tsf85(tmp_path: Path) -> None:

@@ -22,7 +22,6 @@ from texture_core.errors import InvalidParameter
 from texture_core.ros import SENSOR_QOS, STATE_QOS, to_msg, to_ns
 from texture_core.ros_testing import LocalGraph
 from texture_core.types import ExplorationState, Phase
-from texture_drivers import health as stream_watch
 from texture_drivers.nodes.sensor import SensorNode
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
@@ -87,37 +86,28 @@ def test_a_tare_is_requested_and_the_baseline_is_published_and_subtracted(graph:
     assert np.abs(signal[-1].samples).max() == 0.0
 
 
-def test_drift_saturation_and_a_dead_channel_are_named_on_diagnostics(
-    graph: LocalGraph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """One channel is at the end of its range, one never changes, and one leaves its level while nothing touches."""
+def test_drift_while_nothing_touches_is_named_on_diagnostics(graph: LocalGraph, tmp_path: Path) -> None:
     rng, drift = np.random.default_rng(0), [0]
 
     def feed(device: Any, first: int, ticks: int) -> None:
         counts = np.round(20.0 * rng.normal(size=(ticks, 8))).astype(np.int16)
         counts[:, 0] += drift[0]
-        counts[:, 3], counts[:, 7] = 2**15 - 1, 500
         device.measure({'signal': counts[:, :, None]})
 
-    monkeypatch.setattr(stream_watch, 'DEAD_S', 2.0)
     case = replace(CASES['daq'], feed=feed)
     signal = graph.listen(msg.TactileSignal, 'signal', SENSOR_QOS)
     reports = graph.listen(DiagnosticArray, '/diagnostics')
     baselines = graph.listen(msg.TactileSignal, 'signal_baseline', STATE_QOS)
     states = graph.peer.create_publisher(msg.ExplorationState, 'exploration', STATE_QOS)
 
-    def reported(*sentences: str) -> None:
-        graph.until(lambda: all(one in (reports[-1].status[0].message if reports else '') for one in sentences))
-
     with Rig('daq', tmp_path / 'daq', case=case) as rig:
         node = graph.add(SensorNode, sensor='daq', device=str(rig.link), config=case.config, tare_s=0.2)
         graph.until(lambda: states.get_subscription_count() and signal)
         states.publish(to_msg(ExplorationState(1, 'a', 'linear_slide', Phase.DONE)))
-        reported('c3 is saturated', 'c7', 'is dead: it does not change')
         assert node._on_tare(Trigger.Request(), Trigger.Response()).success
         graph.until(lambda: baselines)
         drift[0] = 2000
-        reported('c0 has drifted off its baseline; tare again without load')
+        graph.until(lambda: reports and 'c0 has drifted' in reports[-1].status[0].message)
 
 
 def test_a_tare_without_a_sensor_is_refused(graph: LocalGraph, tmp_path: Path) -> None:

@@ -13,8 +13,6 @@ from texture_simulation.devices.ur import (
     BANNER,
     DashboardSession,
     EmulatedController,
-    EmulatedRobot,
-    ForceMode,
     RtdeMessage,
     RtdeSession,
     SafetyMode,
@@ -118,37 +116,6 @@ def test_zeroing_under_load_hides_the_true_force(controller):
     assert controller.robot.force[2] == pytest.approx(0.0, abs=1e-9)
 
 
-STEP_S = 0.002
-
-
-def robot_over(**values):
-    return EmulatedRobot(
-        UrControllerParams(**{'force_noise_n': 0.0, 'force_offset_n': 0.0, **values}), np.random.default_rng(0)
-    )
-
-
-def go(robot, seconds):
-    for _ in range(round(seconds / STEP_S)):
-        robot.step(STEP_S)
-
-
-def pressing(newtons):
-    return ForceMode(
-        axes=np.eye(3),
-        selection=np.array([0, 0, 1, 0, 0, 0]),
-        wrench=np.array([0, 0, -newtons, 0, 0, 0.0]),
-        limits=np.array([0.1, 0.1, 0.05, 0.3, 0.3, 0.3]),
-    )
-
-
-@pytest.mark.parametrize('stiffness', [500.0, 2000.0, 10000.0])
-def test_force_control_comes_down_and_reaches_the_wanted_force(stiffness):
-    robot = robot_over(stiffness_n_m=stiffness, start_height_m=0.002)
-    robot.force_mode = pressing(2.0)
-    go(robot, 2.0)
-    assert robot.pressing_n == pytest.approx(2.0, rel=0.01)
-
-
 @pytest.fixture
 def session(served):
     return RtdeSession(served, set())
@@ -156,12 +123,6 @@ def session(served):
 
 def message(kind, payload=b''):
     return struct.pack('>HB', 3 + len(payload), kind) + payload
-
-
-def test_an_unknown_variable_is_not_found(session):
-    names = b'timestamp,nonsense,safety_mode,'
-    answer = session.receive(message(RtdeMessage.SETUP_OUTPUTS, struct.pack('>d', 500.0) + names))
-    assert answer[4:] == b'DOUBLE,NOT_FOUND,INT32'
 
 
 def test_an_input_belongs_to_one_client_until_it_leaves(served):

@@ -8,7 +8,7 @@ import argparse
 from collections.abc import Sequence
 from contextlib import nullcontext
 from importlib.metadata import version
-from pathlib import Path
+from itertools import takewhile
 
 from texture_core.cli import Command, add_dask, add_seed, add_slides, core_count, task
 from texture_core.config import refuse_inputs, shipped, write_json
@@ -17,7 +17,7 @@ from texture_estimation.model import both_files, load_model
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.charts import refuse_chart_format
 from texture_evaluation.cross_validation import (
-    compare_all,
+    compare,
     comparison_chart,
     cross_validate,
     dask_backend,
@@ -92,7 +92,7 @@ def _cross_validate(options: argparse.Namespace) -> int:
                 results.append(cross_validate(recipe, dataset, split.splitter, jobs, groups=split.groups))
     for line in (line for result in results for line in table(result, split.name)):
         print(line)
-    compared = compare_all(results)
+    compared = [compare(results[0], other) for other in results[1:]]
     for one in compared:
         print(sentence(one))
     if options.json:
@@ -107,19 +107,12 @@ def _cross_validate(options: argparse.Namespace) -> int:
 
 
 def recipes_and_bags(given: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return the recipes and the bags among arguments: the first is a recipe, and others before the first bag are."""
+    """Return the recipes and the bags: the first is a recipe, and so are shipped names and .yaml files behind it."""
     known = set(shipped('texture_estimation', 'config/recipes'))
-    count = 1
-    while count < len(given) and not _is_bags(given[count], known):
-        count += 1
-    if count == len(given):
+    recipes = [given[0], *takewhile(lambda name: name in known or name.endswith('.yaml'), given[1:])]
+    if len(recipes) == len(given):
         raise InvalidParameter(f'{", ".join(given)} are recipes; name the bags behind them')
-    return list(given[:count]), list(given[count:])
-
-
-def _is_bags(text: str, recipes: set[str]) -> bool:
-    path = Path(text)
-    return path.is_dir() or path.suffix == '.mcap' or (text not in recipes and path.suffix != '.yaml')
+    return recipes, list(given[len(recipes) :])
 
 
 evaluate_ = Command('evaluate a model on labelled bags', _configure_evaluate, _evaluate)

@@ -452,9 +452,8 @@ class EmulatedPvdf(EmulatedSampler):
 # --------------------
 # What a TSF-85 puts on the wire, written from its protocol and not from the driver's code.
 #
-# Packets: `9A 00 58 length payload`; payload items big-endian, item byte = type | finger << 2. Firmware from 1.1.7 on
-# stamps with 64 bits and sends an image when there is a new one; older firmware stamps with 16 bits and repeats the
-# images every millisecond in separate packets.
+# Packets: `9A 00 58 length payload`; payload items big-endian, item byte = type | finger << 2. As firmware from 1.1.7
+# on it stamps with 64 bits and sends an image when there is a new one.
 
 Image = NDArray[np.uint16]
 
@@ -462,18 +461,14 @@ TAXELS = 28
 FINGERS = 2
 RESTING_ACCELERATION = b'\x00\x00\x00\x00\x40\x00'  # 1 g along z at 16384 counts/g
 RESTING_ROTATION = bytes(6)
+STAMP, STAMP_AT = np.dtype('>u8'), slice(5, 13)  # ms
 
 
 class Tsf85Encoder:
     """Make the packets of consecutive milliseconds; a finger that does not sense and the inertial sensors rest."""
 
-    def __init__(self, finger: int = 0, long_stamps: bool = True) -> None:
-        self._finger = finger
-        self._plugged = (True,) * FINGERS
-        self._long_stamps = long_stamps
-        self._stamp_type = '>u8' if long_stamps else '>u2'
-        self._template = np.frombuffer(self._resting_packet(), dtype=np.uint8)
-        self._stamp_at = slice(5, 5 + np.dtype(self._stamp_type).itemsize)
+    def __init__(self) -> None:
+        self.plug((True,) * FINGERS)
 
     def plug(self, plugged: Sequence[bool]) -> None:
         """Send items of the fingers that are plugged in alone, one flag a finger."""
@@ -481,7 +476,7 @@ class Tsf85Encoder:
         self._template = np.frombuffer(self._resting_packet(), dtype=np.uint8)
 
     def _resting_packet(self) -> bytes:
-        items = b'\x70' + bytes(8 if self._long_stamps else 2)
+        items = b'\x70' + bytes(STAMP.itemsize)
         for finger in self._present:
             head = finger << 2
             items += bytes([0x20 | head, 0, 0])
@@ -491,21 +486,20 @@ class Tsf85Encoder:
     def packets(self, first_ms: int, dynamic: Counts, image: Image, image_is_new: bool) -> Iterator[bytes]:
         """Yield the packets of some milliseconds, of (n, n_fingers) values and an (n_taxels, n_fingers) image."""
         rows = np.tile(self._template, (len(dynamic), 1))
-        stamps = (first_ms + np.arange(len(dynamic))).astype(self._stamp_type)  # 16 bits wrap, as they do in the device
-        rows[:, self._stamp_at] = stamps[:, None].view(np.uint8)
+        stamps = (first_ms + np.arange(len(dynamic))).astype(STAMP)
+        rows[:, STAMP_AT] = stamps[:, None].view(np.uint8)
         for finger, counts in self._by_finger(dynamic.T):
-            at = self._stamp_at.stop + self._present.index(finger) * 17 + 1
+            at = STAMP_AT.stop + self._present.index(finger) * 17 + 1
             rows[:, at : at + 2] = counts.astype('>i2')[:, None].view(np.uint8)
         images = [_image_packet(finger, taxels) for finger, taxels in self._by_finger(image.T)]
         for number, row in enumerate(rows):
-            if not self._long_stamps or (image_is_new and number == 0):
+            if image_is_new and number == 0:
                 yield from images
             yield row.tobytes()
 
     def _by_finger(self, values: NDArray[Any]) -> Iterator[tuple[int, NDArray[Any]]]:
         """Yield finger and values, (n,), of each that senses and is plugged in."""
-        first = self._finger if len(values) == 1 else 0
-        yield from ((finger, row) for finger, row in enumerate(values, first) if self._plugged[finger])
+        yield from ((finger, row) for finger, row in enumerate(values) if self._plugged[finger])
 
     @property
     def _present(self) -> list[int]:
