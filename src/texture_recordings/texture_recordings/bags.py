@@ -8,10 +8,12 @@ import io
 import logging
 import os
 import re
+import shutil
 import struct
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from functools import cache, partial
 from itertools import pairwise
@@ -32,9 +34,12 @@ from texture_core.types import (
     QUALITIES,
     Array,
     ExplorationRequest,
+    ExplorationState,
     MessageCodec,
+    Phase,
     Quality,
     TactileSignal,
+    checked_label,
 )
 
 try:
@@ -539,34 +544,6 @@ class Continuity:
 
 
 # --------------------
-# Slides of others, which have no log times and mostly no stamps: these are made up.
-
-START_NS, PAUSE_NS = 1_000_000_000 * NANOSECONDS, NANOSECONDS  # where the first slide begins, and between two of them
-BATCH_S = 0.1
-DELAY_NS = 100_000  # a batch is logged this long after its last sample
-
-
-def slide_batches(
-    like: TactileSignal,
-    samples: Array,
-    index: NDArray[Any],
-    start_ns: int,
-    *,
-    batch_s: float = BATCH_S,
-    edges: Iterable[int] = (),
-) -> Iterator[TactileSignal]:
-    """Yield the samples of a slide in batches; each loss and each edge begins a new one."""
-    rate_hz, first = like.sampling_rate_hz, like.first_sample
-    step = max(1, round(batch_s * rate_hz))
-    borders = {0, *edges, *(np.flatnonzero(np.diff(index) != 1) + 1).tolist(), len(index)}
-    for begin, end in pairwise(sorted(borders)):
-        for row in range(begin, end, step):
-            place, part = int(index[row]), samples[row : min(row + step, end)].astype(np.float32)
-            stamp_ns = start_ns + round(place / rate_hz * NANOSECONDS)
-            yield replace(like, stamp_ns=stamp_ns, first_sample=first + place, samples=part)
-
-
-# --------------------
 # Write recordings: rosbag2 folders with MCAP inside, which `ros2 bag` opens too; no ROS is needed.
 
 FOREVER = QosTime(2147483647, 4294967295)
@@ -672,3 +649,107 @@ class BagWriter:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+# --------------------
+# Slides of others, which have no log times and mostly no stamps: these are made up.
+
+START_NS, PAUSE_NS = 1_000_000_000 * NANOSECONDS, NANOSECONDS  # where the first slide begins, and between two of them
+BATCH_S = 0.1
+DELAY_NS = 100_000  # a batch is logged this long after its last sample
+MAX_BAGS = 500
+
+# By topic: all samples of a slide, and their places on the grid, (n,).
+SlideStreams = Mapping[str, tuple[TactileSignal, NDArray[Any]]]
+
+
+def slide_batches(
+    signal: TactileSignal,
+    index: NDArray[Any],
+    start_ns: int,
+    *,
+    batch_s: float = BATCH_S,
+    edges: Iterable[int] = (),
+) -> Iterator[TactileSignal]:
+    """Yield the samples of a slide in batches; each loss and each edge begins a new one."""
+    rate_hz, first = signal.sampling_rate_hz, signal.first_sample
+    step = max(1, round(batch_s * rate_hz))
+    borders = {0, *edges, *(np.flatnonzero(np.diff(index) != 1) + 1).tolist(), len(index)}
+    for begin, end in pairwise(sorted(borders)):
+        for row in range(begin, end, step):
+            place, part = int(index[row]), signal.samples[row : min(row + step, end)].astype(np.float32)
+            stamp_ns = start_ns + round(place / rate_hz * NANOSECONDS)
+            yield replace(signal, stamp_ns=stamp_ns, first_sample=first + place, samples=part)
+
+
+class SlideBags:
+    """Bags below a folder, written slide by slide; use it in a `with` block, where an error removes them again.
+
+    Each slide begins a second after the one before, in whatever bag that is, so slides keep their order over all bags.
+    Without a folder nothing is written.
+    """
+
+    def __init__(self, out: str | Path | None) -> None:
+        self._out = None if out is None else Path(out)
+        self._open = ExitStack()
+        self._bags: dict[str, BagWriter] = {}
+        self._next: Counter[tuple[str, str]] = Counter()
+        self._now_ns = START_NS
+
+    @property
+    def paths(self) -> list[Path]:
+        """Paths of the bags in the order in which they were begun."""
+        return [bag.path for bag in self._bags.values()]
+
+    def write(
+        self,
+        session: str,
+        states: Sequence[ExplorationState],
+        streams: SlideStreams,
+        batch_s: float = BATCH_S,
+        edges: Sequence[int] = (),
+    ) -> None:
+        """Write a slide, whose stamps count from 0, and its end into the bag of a session."""
+        bag = self._bag(session)
+        if bag is None:
+            return
+        messages: list[tuple[int, str, Any]] = []
+        end_ns = 1
+        for topic, (signal, index) in streams.items():
+            numbered = replace(signal, first_sample=self._next[session, topic])
+            for batch in slide_batches(numbered, index, self._now_ns, batch_s=batch_s, edges=edges):
+                messages.append((batch.end_ns + DELAY_NS, topic, batch))
+                self._next[session, topic] = batch.next_sample
+            end_ns = max(end_ns, round(float(index[-1] + 1) / signal.sampling_rate_hz * NANOSECONDS))
+        ends = [replace(states[-1], stamp_ns=end_ns, phase=phase) for phase in (Phase.LIFT, Phase.DONE)]
+        for state, after in pairwise([*states, *ends[states[-1].phase is Phase.LIFT :], ends[-1]]):
+            at_ns, steady_s = self._now_ns + state.stamp_ns, max(0, after.stamp_ns - state.stamp_ns) / NANOSECONDS
+            # Before the first batch that it covers, and after those before it.
+            log_ns = at_ns + DELAY_NS * (2 * (state.stamp_ns > 0) + (state.phase is Phase.DONE))
+            stamped = replace(state, stamp_ns=at_ns, steady_s=steady_s, progress=state.stamp_ns / end_ns)
+            messages.append((log_ns, EXPLORATION, stamped))
+        bag.write_all(messages)
+        self._now_ns += end_ns + PAUSE_NS
+
+    def _bag(self, session: str) -> BagWriter | None:
+        if session not in self._bags:
+            name = checked_label(session)
+            if not name or name.startswith('.') or len(self._bags) >= MAX_BAGS:
+                raise InvalidData(
+                    f"no bag can be named '{name}' as the {len(self._bags) + 1}th; at most {MAX_BAGS} bags with plain "
+                    'names are made, choose another `session`'
+                )
+            if self._out is None:
+                return None
+            self._out.mkdir(parents=True, exist_ok=True)
+            self._bags[session] = self._open.enter_context(BagWriter(self._out / name))
+        return self._bags[session]
+
+    def __enter__(self) -> SlideBags:
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self._open.__exit__(*error)
+        if error[0]:
+            for path in self.paths:
+                shutil.rmtree(path, ignore_errors=True)

@@ -7,11 +7,9 @@ from __future__ import annotations
 import fnmatch
 import math
 import re
-import shutil
 import unicodedata
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
@@ -23,7 +21,7 @@ from texture_core.cli import progress
 from texture_core.config import parse_yaml
 from texture_core.errors import InvalidData
 from texture_core.types import NANOSECONDS, AnyArray, Array, ExplorationState, Phase, TactileSignal, checked_label
-from texture_recordings.bags import DELAY_NS, PAUSE_NS, START_NS, BagWriter, is_bag, is_cut_off, slide_batches
+from texture_recordings.bags import SlideBags, SlideStreams, is_bag, is_cut_off
 from texture_recordings.clock import (
     MAX_LEFT_OUT,
     SAME_RATE,
@@ -56,7 +54,6 @@ from texture_recordings.readers import (
     number_of,
     placed,
 )
-from texture_recordings.slides import STATES
 
 PLAUSIBLE_HZ, LIKELY_HZ = (5.0, 200_000.0), (20.0, 20_000.0)
 LONGEST_SLIDE_S = 1800.0
@@ -156,7 +153,7 @@ def import_tables(
     left out, or a bag exists already.
     """
     report = ImportReport()
-    with SlideBags(mapping, out) as bags:
+    with SlideBags(out) as bags:
         for path, place, fields in progress(_files(mapping, Path(source), kinds, report), 'import files'):
             for frame in frames(path, place, mapping):
                 with placed(frame.place):
@@ -238,10 +235,6 @@ class Stream:
     per_row: int
     rate_hz: float = 0.0  # of rows
     burst_s: float = 0.0
-
-
-# By topic: a stream, and of one slide its samples and their places on the grid.
-SlideStreams = Mapping[str, tuple[Stream, AnyArray, AnyArray]]
 
 
 class FrameSlides:
@@ -607,7 +600,7 @@ class FrameSlides:
 
     def _samples(
         self, stream: Stream, surface: str, frame_rows: tuple[int, int], begin_s: float, end_s: float
-    ) -> tuple[Stream, AnyArray, AnyArray]:
+    ) -> tuple[TactileSignal, AnyArray]:
         """Return the samples of a slide, and their places on the grid."""
         at = stream.rows / stream.rate_hz if stream.time_s is None else stream.time_s
         if stream.group == self._reference.group:
@@ -635,7 +628,9 @@ class FrameSlides:
         # Successive columns that are consecutive samples of one channel.
         count = stream.per_row
         flat = samples[rows].reshape(len(rows), -1, count).transpose(0, 2, 1).reshape(len(rows) * count, -1)
-        return stream, flat, np.add.outer(index * count, np.arange(count)).ravel()
+        units, sensor = (stream.params.unit,) * len(stream.channels), self._mapping.sensor
+        signal = TactileSignal(0, sensor, stream.channels, units, stream.rate_hz * count, 0, flat, sensor)
+        return signal, np.add.outer(index * count, np.arange(count)).ravel()
 
     # ---- conditions
 
@@ -723,79 +718,3 @@ def _mean(times: Array, values: Array, begin_s: float, end_s: float) -> float:
         return float(values[0]) if len(values) else math.nan
     inside = values[(times >= begin_s) & (times < end_s)]
     return float(inside.mean()) if len(inside) else float(values[max(0, int(np.searchsorted(times, begin_s)) - 1)])
-
-
-# --------------------
-# Bags of the slides.
-
-MAX_BAGS = 500
-
-
-class SlideBags:
-    """Bags below a folder, written slide by slide; use it in a `with` block, where an error removes them again.
-
-    Stamps are made up: each slide begins a second after the one before, in whatever bag that is, so slides keep their
-    order over all bags.
-    """
-
-    def __init__(self, mapping: TableMapping, out: str | Path | None) -> None:
-        self._mapping, self._out = mapping, None if out is None else Path(out)
-        self._open = ExitStack()
-        self._bags: dict[str, BagWriter] = {}
-        self._next: dict[tuple[str, str], int] = {}
-        self._now_ns = START_NS
-
-    @property
-    def paths(self) -> list[Path]:
-        """Paths of the bags in the order in which they were begun."""
-        return [bag.path for bag in self._bags.values()]
-
-    def write(self, session: str, states: Sequence[ExplorationState], streams: SlideStreams) -> None:
-        """Write a slide, whose stamps count from 0, into the bag of a session."""
-        bag = self._bag(session)
-        if bag is None:
-            return
-        messages: list[tuple[int, str, Any]] = []
-        end_ns = 1
-        for topic, (stream, samples, index) in streams.items():
-            units, rate_hz = (stream.params.unit,) * len(stream.channels), stream.rate_hz * stream.per_row
-            like = TactileSignal(
-                0, self._mapping.sensor, stream.channels, units, rate_hz, self._next.get((session, topic), 0),
-                np.empty((0, len(units)), dtype=np.float32), self._mapping.sensor,
-            )  # fmt: skip
-            for batch in slide_batches(like, samples, index, self._now_ns):
-                messages.append((batch.end_ns + DELAY_NS, topic, batch))
-                self._next[session, topic] = batch.next_sample
-            end_ns = max(end_ns, round(float(index[-1] + 1) / rate_hz * NANOSECONDS))
-        for state, until_ns in zip(states, [*(state.stamp_ns for state in states[1:]), end_ns], strict=True):
-            at_ns, steady_s = self._now_ns + state.stamp_ns, max(0, until_ns - state.stamp_ns) / NANOSECONDS
-            progress = state.stamp_ns / end_ns
-            messages.append((at_ns, STATES, replace(state, stamp_ns=at_ns, steady_s=steady_s, progress=progress)))
-        over = replace(states[-1], stamp_ns=self._now_ns + end_ns, progress=1.0)
-        for count, phase in enumerate((Phase.LIFT, Phase.DONE), 3):
-            messages.append((over.stamp_ns + count * DELAY_NS, STATES, replace(over, phase=phase)))
-        bag.write_all(messages)
-        self._now_ns = max(log_ns for log_ns, _, _ in messages) + PAUSE_NS
-
-    def _bag(self, session: str) -> BagWriter | None:
-        if session not in self._bags:
-            name = checked_label(session)
-            if not name or name.startswith('.') or len(self._bags) >= MAX_BAGS:
-                raise InvalidData(
-                    f"no bag can be named '{name}' as the {len(self._bags) + 1}th; at most {MAX_BAGS} bags with plain "
-                    'names are made, choose another `session`'
-                )
-            if self._out is None:
-                return None
-            self._out.mkdir(parents=True, exist_ok=True)
-            self._bags[session] = self._open.enter_context(BagWriter(self._out / name))
-        return self._bags[session]
-
-    def __enter__(self) -> SlideBags:
-        return self
-
-    def __exit__(self, *error: Any) -> None:
-        self._open.__exit__(*error)
-        if error[0]:
-            for path in self.paths:
-                shutil.rmtree(path, ignore_errors=True)
