@@ -8,7 +8,7 @@ import math
 import re
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -49,37 +49,45 @@ class PublicSet:
         if not files:
             raise InvalidData(f"no file {self.files} in '{source}'; give the folder that holds it")
         found: defaultdict[str, list[tuple[tuple[Any, ...], Path, str]]] = defaultdict(list)
-        for file in files:
-            with _opened(file) as arrays:
-                for key in arrays.names:
+        with ExitStack() as opened:
+            contents: dict[Path, Arrays] = {}
+            for file in files:
+                with _reading(file):
+                    contents[file] = Arrays(opened.enter_context(open_regular(file)))
+                for key in contents[file].names:
                     if match := re.fullmatch(self.key, f'{file.stem}/{key}'):
                         surface, order = self.order(*match.groups())
                         found[surface].append((order, file, key))
-        for name in materials:
-            if name not in found:
-                raise unknown_name(name, found, 'surface')
-        wanted, chosen = parse_selection(slides), []
-        for surface in materials or sorted(found):
-            numbered = enumerate(sorted(found[surface]), 1)
-            of_surface = [(surface, *slide) for number, slide in numbered if wanted is None or number in wanted]
-            if not of_surface:
-                raise InvalidData(f"'{surface}' has none of the requested slides; it has 1 to {len(found[surface])}")
-            chosen += of_surface
-        with SlideBags(out) as bags:
+            chosen = _chosen(found, slides, materials)
             chosen.sort(key=lambda slide: self.session(*slide[:2]))
+            bags = opened.enter_context(SlideBags(out))
             for surface, order, file, key in progress(chosen, 'import slides', len(chosen)):
-                with _opened(file) as arrays:
-                    recording = self.slide(surface, order, arrays, key)
+                with _reading(file):
+                    recording = self.slide(surface, order, contents[file], key)
                 bags.write(self.session(surface, order), *recording)
         return bags.paths
 
 
+def _chosen(found: Mapping[str, Sequence[Any]], slides: str, surfaces: Sequence[str]) -> list[Any]:
+    """Return the wanted slides, each behind its surface, numbered separately for each surface in their order."""
+    for name in surfaces:
+        if name not in found:
+            raise unknown_name(name, found, 'surface')
+    wanted, chosen = parse_selection(slides), []
+    for surface in surfaces or sorted(found):
+        numbered = enumerate(sorted(found[surface]), 1)
+        of_surface = [(surface, *slide) for number, slide in numbered if wanted is None or number in wanted]
+        if not of_surface:
+            raise InvalidData(f"'{surface}' has none of the requested slides; it has 1 to {len(found[surface])}")
+        chosen += of_surface
+    return chosen
+
+
 @contextmanager
-def _opened(file: Path) -> Iterator[Arrays]:
-    """Yield the arrays of a file; InvalidData if they are not as those of its data set."""
+def _reading(file: Path) -> Iterator[None]:
+    """Refuse a file whose content is not as that of its data set."""
     try:
-        with open_regular(file) as opened:
-            yield Arrays(opened)
+        yield
     except (OSError, ValueError, LookupError, ArithmeticError) as error:
         raise InvalidData(f"'{file}' is not a file of this data set: {error}; fetch it again") from error
 
