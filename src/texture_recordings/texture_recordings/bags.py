@@ -18,8 +18,7 @@ from dataclasses import replace
 from functools import cache, partial
 from itertools import pairwise
 from pathlib import Path
-from types import SimpleNamespace
-from typing import IO, Any, BinaryIO, Literal, NamedTuple
+from typing import IO, Any, BinaryIO, NamedTuple, cast
 from zlib import crc32
 
 import numpy as np
@@ -45,7 +44,6 @@ from texture_core.types import (
 try:
     import apsw
     import lz4.frame
-    import rosbags.rosbag2.reader
     from rosbags.interfaces import (
         Connection,
         MessageDefinitionFormat,
@@ -93,22 +91,6 @@ END = b'\x02' + (20).to_bytes(8, 'little') + bytes(20) + MAGIC
 FOOTER_BYTES, CHECKSUM_FROM_END = len(END), 12
 
 
-class _Unpacked(zstd.ZstdFile):
-    """What zstd packed, up to the limit."""
-
-    def __init__(self, packed: BinaryIO, mode: Literal['rb'] = 'rb') -> None:
-        self._size, self._given = packed.seek(0, io.SEEK_END), 0
-        packed.seek(0)
-        super().__init__(packed, mode)
-
-    def read(self, size: int | None = -1) -> bytes:
-        """Return the next bytes; FileRefused beyond the limit."""
-        part = super().read(max(MAX_UNPACKED_BYTES, MAX_RATIO * self._size) + 1 if size is None or size < 0 else size)
-        self._given += len(part)
-        _check_unpacked(self._given, self._size)
-        return part
-
-
 def _check_unpacked(unpacked: int, size: int) -> None:
     most = max(MAX_UNPACKED_BYTES, MAX_RATIO * size)
     if unpacked > most:
@@ -117,12 +99,9 @@ def _check_unpacked(unpacked: int, size: int) -> None:
         )
 
 
-# rosbags unpacks whatever comes; here it stops at what a chunk declares, or at the limit.
-storage_mcap.DECOMPRESSORS['zstd'] = lambda data, size: _Unpacked(io.BytesIO(data)).read(size + 1)
-storage_mcap.DECOMPRESSORS['lz4'] = lambda data, size: lz4.frame.open(io.BytesIO(data)).read(size + 1)
-vars(rosbags.rosbag2.reader)['zstd'] = SimpleNamespace(
-    open=_Unpacked, decompress=lambda data: _Unpacked(io.BytesIO(data)).read()
-)
+# rosbags unpacks whatever comes; here it stops at what a chunk declares.
+storage_mcap.DECOMPRESSORS['zstd'] = lambda data, size: zstd.ZstdDecompressor().decompress(data, size + 1)
+storage_mcap.DECOMPRESSORS['lz4'] = lambda data, size: lz4.frame.LZ4FrameDecompressor().decompress(data, size + 1)
 
 
 class CheckedPath(type(Path())):  # type: ignore[misc]
@@ -141,42 +120,29 @@ class CheckedPath(type(Path())):  # type: ignore[misc]
         if whole:
             return file
         logging.getLogger(__name__).warning("'%s' was cut off; it is read up to its last whole chunk", self)
-        return io.BufferedReader(_Ended(file, end))
+        return cast('IO[Any]', _Ended(file, end))
 
     def read_text(self, encoding: str | None = None, errors: str | None = None) -> str:
         """Return the text of a short file."""
         return read_text(self, MAX_METADATA_BYTES, encoding or 'utf-8')
 
 
-class _Ended(io.RawIOBase):
-    """The first bytes of a file, and the end that it lacks."""
+class _Ended:
+    """A file up to its last whole chunk, behind which it has the end that it lacks."""
 
     def __init__(self, file: BinaryIO, length: int) -> None:
-        self._file, self._length, self._at = file, length, 0
-
-    def readable(self) -> bool:
-        return True
-
-    def seekable(self) -> bool:
-        return True
+        self._file, self._length = file, length
+        self.tell, self.close = file.tell, file.close
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        self._at = offset + {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: self._length + len(END)}[whence]
-        return self._at
+        """Go to a place; from the end on, to where the end that is lacking begins."""
+        if whence == io.SEEK_END:
+            return self._file.seek(self._length)
+        return self._file.seek(offset, whence)
 
-    def readinto(self, buffer: Any) -> int:
-        if self._at < self._length:
-            self._file.seek(self._at)
-            part = self._file.read(min(len(buffer), self._length - self._at))
-        else:
-            part = END[self._at - self._length :][: len(buffer)]
-        buffer[: len(part)] = part
-        self._at += len(part)
-        return len(part)
-
-    def close(self) -> None:
-        self._file.close()
-        super().close()
+    def read(self, size: int = -1) -> bytes:
+        """Return the next bytes."""
+        return END if self._file.tell() == self._length else self._file.read(size)
 
 
 def _has_end(file: BinaryIO) -> bool:
@@ -510,6 +476,9 @@ def _files(path: Path) -> list[Path]:
     if not path.is_dir():
         return [path]
     facts = parse_yaml((path / 'metadata.yaml').read_text(encoding='utf-8'))['rosbag2_bagfile_information']
+    mode = str(facts.get('compression_mode', '')).lower()
+    if mode in {'file', 'message'}:
+        raise FileRefused(f'it is compressed by {mode}, and storage alone is read so; unpack it by ros2 bag convert')
     # As rosbags finds them: next to the metadata, whatever folder the entry names.
     return [path / Path(str(name)).name for name in facts['relative_file_paths']]
 
