@@ -61,13 +61,11 @@ STATE_S = 0.1  # a state so often where a condition changes along a slide
 SAME_TIME_S = 1e-9
 MAX_NUMBERED = 3  # columns name_1 … name_n beyond this may be samples: the mapping has to tell
 ROWS_A_CODE = 2  # at least, of a column that may name sensors, trials or runs
-CLOCK_TEXT = re.compile(r'[-\d/.T ]*\d{1,2}:\d\d[-+:.,\d ZAPM]*')  # of the day: it changes as time does
 MANY_TEXTS = 50  # different ones are no codes
-FLAGS = [{one, other} for one, other in (('true', 'false'), ('yes', 'no'), ('on', 'off'))]
+FLAGS = {'true', 'false', 'yes', 'no', 'on', 'off'}
 CODE_NAME = re.compile(
     r'(?:sensor|finger|trial|run|rep|repeat|repetition|recording|session|pass|stroke)s?[ _-]?(?:id|no|nr|number)?'
 )
-MAX_NAMED = 20  # sensors, trials or runs, of a column that is named so: more are its samples
 MAX_TURNS, IN_TURN = 100, 0.7  # sensors in turn, and share of rows with the number of as many rows before
 # Lowest and highest mean of a slide that a tactile finger reaches, in SI units.
 PLAUSIBLE: Mapping[str, tuple[float, float]] = {
@@ -295,19 +293,13 @@ class FrameSlides:
             if not mask.any():
                 has = ', '.join(sorted({*texts.tolist()})[:5])
                 raise InvalidData(f"column '{name}' has no row '{value}'; it has {has}")
-            timed = all(one.time.column for one in self._mapping.streams.values())
-            junk = np.zeros(len(mask), dtype=bool) if frame.junk is None or timed else frame.junk
-            lines = np.arange(len(mask)) if frame.lines is None else frame.lines
-            good = np.flatnonzero(~junk)
-            between = np.flatnonzero(np.diff(good) > 1)
-            if len(between):
-                row = f'row {lines[good[between[0]] + 1]}'
-                reason = next((one for one in frame.reasons if one.startswith(f'{row},')), f'{row} is malformed')
+            if any(not one.time.column for one in self._mapping.streams.values()) and frame.reasons:
                 raise InvalidData(
-                    f'{reason}: of a malformed row nobody knows whether it is one of those under `rows`, so without a '
-                    'column of time the rows behind it may shift; give one, or remove the row'
+                    f'{frame.reasons[0]}: of a malformed row nobody knows whether it is one of those under `rows`, so '
+                    'without a column of time the rows behind it may shift; give one, or remove the row'
                 )
             self._report.leave_out('rows are not those under `rows`', int((~mask).sum()))
+            lines = np.arange(len(mask)) if frame.lines is None else frame.lines
             frame = replace(
                 frame, lines=lines[mask], junk=None if frame.junk is None else frame.junk[mask],
                 columns={key: one[mask] if one.shape == mask.shape else one for key, one in frame.columns.items()},
@@ -448,8 +440,8 @@ class FrameSlides:
             plain = array.ndim and array.dtype.kind in 'OUSbiuf'
             if name in used or not plain or self._group(name) != self._reference.group:
                 continue
-            values = self._codes(name)
-            for span in self._spans if len(values) else ():
+            values = self._frame.texts(name) if array.dtype.kind in 'OUSb' else self._frame.numbers(name)
+            for span in self._spans:
                 rows = self._reference.rows[span]
                 rows = rows[values[rows] != ''] if values.dtype.kind == 'O' else rows[np.isfinite(values[rows])]
                 if name not in found and (row := _mixed(values[rows], named=_is_code(name))):
@@ -465,29 +457,6 @@ class FrameSlides:
                 f'there by slides: {{by: column, column: {key}}}, or take all as one signal by rows: '
                 f'{{{all_of}}}'
             )  # fmt: skip
-
-    def _codes(self, name: str) -> AnyArray:
-        """Return what may be codes of sensors, trials or runs, (n,) texts or numbers; nothing of other columns."""
-        array, named, times = self._frame[name], _is_code(name), self._reference.time_s
-        nothing = np.empty(0)
-        values = self._frame.texts(name) if array.dtype.kind in 'OUSb' else self._frame.numbers(name)
-        if values.dtype.kind == 'O':
-            texts, counts = np.unique(values[values != ''], return_counts=True)
-            numbers = np.array([number_of(one) for one in texts.tolist()])
-            flag = len(texts) <= 2 and {one.lower() for one in texts.tolist()} in FLAGS
-            few = 0 < len(texts) <= counts.sum() / ROWS_A_CODE
-            if not few or CLOCK_TEXT.fullmatch(texts[0]) or (not named and (flag or len(texts) > MANY_TEXTS)):
-                return nothing
-            if np.isnan(numbers).sum() > 1 or np.isnan(numbers).all():
-                return values
-            values = self._frame.numbers(name)  # next to '-' or the like where there is none
-        known = values[np.isfinite(values)]
-        if not 2 <= len(np.unique(known)) <= len(values) / ROWS_A_CODE or (known % 1.0).any():
-            return nothing
-        if times is not None and not named and len(np.unique(known)) > 2:
-            ahead = values[self._reference.rows] - times  # seconds without their parts
-            return nothing if np.nanmax(ahead) - np.nanmin(ahead) <= 1.0 + SAME_TIME_S else values
-        return values
 
     def _rated(self, stream: Stream) -> Stream:
         """Return a stream with the rate of its rows: as stated, else by its times, which must agree."""
@@ -695,21 +664,20 @@ def _key(name: str) -> str:
 
 
 def _mixed(values: AnyArray, *, named: bool) -> int:
-    """Return the first row at which texts change, or numbers in turn or in blocks; 0 if none does.
+    """Return the first row at which few texts of a slide change, or whole numbers in turn or in blocks; 0 if none does.
 
-    In a column that is named as one of codes flags may be in blocks, too, and few others in any order.
+    Flags in blocks are no codes, unless the column is named as one of codes, whose every change counts.
     """
     found, codes = np.unique(values, return_inverse=True)
     changes, count = np.flatnonzero(codes[1:] != codes[:-1]) + 1, len(found)
-    if values.dtype.kind != 'O' and len(codes) < ROWS_A_CODE * count:  # a number of rows
-        return 0
-    flags = values.dtype.kind != 'O' and not named and {*found.tolist()} <= {0.0, 1.0}
-    in_blocks = values.dtype.kind == 'O' or (len(changes) == count - 1 and (named or not flags))
-    in_blocks |= named and not flags and count <= MAX_NAMED
-    in_turn = (
-        count <= MAX_TURNS and len(changes) > 0.5 * len(codes) and (codes[count:] == codes[:-count]).mean() > IN_TURN
-    )
-    return int(changes[0]) if len(changes) and (in_blocks or in_turn) else 0
+    mixed = 2 <= count <= len(values) / ROWS_A_CODE
+    if values.dtype.kind == 'O':
+        mixed &= named or (count <= MANY_TEXTS and not {text.lower() for text in found.tolist()} <= FLAGS)
+    elif not named and mixed:
+        in_blocks = len(changes) == count - 1 and not {*found.tolist()} <= {0.0, 1.0}
+        in_turn = len(changes) > 0.5 * len(codes) and (codes[count:] == codes[:-count]).mean() > IN_TURN
+        mixed = not (found % 1.0).any() and (in_blocks or (count <= MAX_TURNS and bool(in_turn)))
+    return int(changes[0]) if mixed else 0
 
 
 def _mean(times: Array, values: Array, begin_s: float, end_s: float) -> float:
