@@ -62,8 +62,8 @@ VALUES = [
 ]
 
 
-def write(path: Path, count: int = 200, namespace: str = '/') -> Path:
-    with BagWriter(path, namespace) as bag:
+def write(path: Path, count: int = 200) -> Path:
+    with BagWriter(path) as bag:
         for index in range(count):
             bag.write('signal', signal(5 * index), STAMP_NS + index)
     return path
@@ -88,9 +88,9 @@ def test_messages_come_in_the_order_of_their_log_times_whatever_the_order_of_wri
 
 def test_a_bag_played_by_ros_offers_every_topic_as_the_nodes_do(tmp_path: Path) -> None:
     baseline = dataclasses.replace(signal(), stamp_ns=1)
-    with BagWriter(tmp_path / 'bag', '/left') as bag:
+    with BagWriter(tmp_path / 'bag') as bag:
         for topic, value in (*VALUES, ('signal_baseline', baseline)):
-            bag.write(topic, value, 1)
+            bag.write(f'left/{topic}', value, 1)
     with Reader(tmp_path / 'bag') as reader:
         offered = {c.topic.rpartition('/')[2]: c.ext.offered_qos_profiles[0] for c in reader.connections}
     latched = {'texture', 'roughness', 'exploration', 'model_info', 'signal_baseline'}
@@ -99,9 +99,9 @@ def test_a_bag_played_by_ros_offers_every_topic_as_the_nodes_do(tmp_path: Path) 
 
 
 def test_topics_are_chosen_by_the_last_part_of_their_name(tmp_path: Path) -> None:
-    with BagWriter(tmp_path / 'bag', '/left') as bag:
-        bag.write('signal', signal(), 1)
-        bag.write('features', VALUES[2][1], 2)
+    with BagWriter(tmp_path / 'bag') as bag:
+        bag.write('left/signal', signal(), 1)
+        bag.write('left/features', VALUES[2][1], 2)
     assert [topic for topic, _, _ in read_bag(tmp_path / 'bag', ('features',))] == ['features']
     assert [message.topic for _, message in read_named(tmp_path / 'bag')] == ['/left/signal', '/left/features']
 

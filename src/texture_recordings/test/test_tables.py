@@ -141,14 +141,9 @@ def test_a_mapping_that_does_not_fit_is_refused_with_the_place(
         ),
         ({'slides': {'by': 'label'}}, 'mapping, slides: .* allowed is one of file, column, pause, row'),
         ({'conditions': {'speed': {'unit': 'mph'}}}, "the unit of speed is 'mph'; use one of m/s, cm/s, mm/s"),
-        ({'files': '{a}{b}.csv'}, 'fields without text between'),
         ({'files': '{a}_{a}.csv'}, 'has a field twice'),
         ([], 'a mapping of parameter names to values is needed'),
         ({'streams': {'signal': {'columns': ['a'], 'scale': math.inf}}}, "'scale' is inf; allowed is a finite number"),
-        (
-            {'streams': {'signal': {'columns': ['a'], 'rate_hz': 1e-9}}},
-            "'rate_hz' is 1e-09; allowed are 0 and 0.001 to",
-        ),
         ({'streams': {'signal': {'columns': ['a'], 'rate_hz': 10**5000}}}, "'rate_hz' is inf; allowed is 0.0 to"),
     ],
 )

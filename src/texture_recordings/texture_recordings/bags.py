@@ -22,11 +22,10 @@ from typing import IO, Any, BinaryIO, NamedTuple, cast
 from zlib import crc32
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
 from texture_core.config import MB, FileRefused, folder, open_regular, parse_yaml, read_text
-from texture_core.errors import InvalidData, MissingLibrary
+from texture_core.errors import InvalidData, MissingLibrary, TextureError
 from texture_core.types import (
     DATA_CLASSES,
     NANOSECONDS,
@@ -42,7 +41,6 @@ from texture_core.types import (
 )
 
 try:
-    import apsw
     import lz4.frame
     from rosbags.interfaces import (
         Connection,
@@ -65,7 +63,6 @@ try:
     )
     from rosbags.serde import SerdeError
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-    from rosbags.typesys.base import TypesysError
     from rosbags.typesys.store import Typestore
 
     if sys.version_info >= (3, 14):
@@ -316,12 +313,6 @@ def _folder(topic: str) -> str:
 # --------------------
 # Find and read recordings: rosbag2 folders with MCAP inside, which `ros2 bag` opens too; no ROS is needed.
 
-# What the reader raises, depending on which byte of a file is wrong.
-BROKEN = (
-    ReaderError, TypesysError, zstd.ZstdError, apsw.Error, yaml.YAMLError, OSError, EOFError, struct.error,
-    RuntimeError, ValueError, LookupError, TypeError, AttributeError, AssertionError, MemoryError, OverflowError,
-)  # fmt: skip
-
 
 class RawMessage(NamedTuple):
     """One message as stored in a bag."""
@@ -465,7 +456,9 @@ def _read(
                 yield name, RawMessage(connection.topic, connection.msgtype, log_ns, data)
             if missing and start_ns is None and stop_ns is None:
                 raise ReaderError(f'{missing} of its messages are missing')
-    except BROKEN as error:
+    except TextureError:
+        raise
+    except Exception as error:  # whatever the reader raises, which depends on the byte that is wrong
         raise InvalidData(
             f"the bag '{path}' cannot be read, it is damaged or cut off: {error}; record it again"
         ) from error
@@ -545,9 +538,8 @@ def quality_of(topic: str) -> Quality | None:
 class BagWriter:
     """Write a new bag; use it in a `with` block, at the end of which the bag is complete."""
 
-    def __init__(self, path: str | Path, namespace: str = '/') -> None:
+    def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        self._namespace = '/' + namespace.strip('/')
         self._connections: dict[tuple[str, str], Connection] = {}
         self.qualities: dict[str, Quality] = {}  # of topics unknown to `quality_of`, as they were offered
         if self.path.exists():
@@ -607,7 +599,7 @@ class BagWriter:
         file.seek(0, os.SEEK_END)
 
     def _connect(self, topic: str, msgtype: str) -> Connection:
-        name = topic if topic.startswith('/') else f'{self._namespace.rstrip("/")}/{topic}'
+        name = topic if topic.startswith('/') else f'/{topic}'
         quality = quality_of(name) or self.qualities.get(name)
         # For `ros2 bag play`, which offers what was offered when it was recorded.
         qos = [_offered(quality)] if quality else []

@@ -12,7 +12,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -176,17 +176,9 @@ def _at(time_s: float, times: AnyArray, values: AnyArray) -> float:
 # Sets of one stream of evenly spaced samples at a constant speed and force.
 
 
-class SteadySlide(NamedTuple):
-    """One slide: samples (n, n_channels), conditions (NaN if unknown), and the samples in which the finger slides.
-
-    Before `steady` the finger is in contact, after it lifts; all samples belong to the slide if it is None.
-    """
-
-    samples: AnyArray
-    speed_m_s: float
-    force_n: float
-    direction_rad: float
-    steady: range | None = None
+# Samples (n, n_channels), speed (m/s), force (N) and direction (rad), NaN if unknown, and the samples in which the
+# finger slides: before them it is in contact, after them it lifts; None for all.
+SteadySlide = tuple[AnyArray, float, float, float, range | None]
 
 
 def _steady(
@@ -250,7 +242,7 @@ def _fabricslide_slide(order: tuple[Any, ...], recorded: AnyArray) -> SteadySlid
     # A run that is not of that length, as those over gratings, is taken as it is.
     steady = range(first, last) if first < last <= len(recorded) else None
     # The taxels come after the time (ms) and two proximities.
-    return SteadySlide(recorded[:, 3:19], speed_m_s, counts / 100.0, math.pi / 2 if up else -math.pi / 2, steady)
+    return recorded[:, 3:19], speed_m_s, counts / 100.0, math.pi / 2 if up else -math.pi / 2, steady
 
 
 # --------------------
@@ -265,21 +257,18 @@ def _fabricslide_slide(order: tuple[Any, ...], recorded: AnyArray) -> SteadySlid
 NTP21_TAXELS = 9
 TIME = 10  # column of the time, s; the one between is auxiliary and of unknown meaning: left out
 RATE_HZ = 320.0
-SLOWEST = 10.0  # times the nominal duration; a time stamp that is wrong would need any number of samples
 
 
 def _ntp21_slide(order: tuple[Any, ...], recorded: AnyArray) -> SteadySlide:
     speed_mm_s, force_n = order
     samples = evenly(np.asarray(recorded[:, :NTP21_TAXELS], dtype=float), float(recorded[-1, TIME] - recorded[0, TIME]))
-    return SteadySlide(samples, speed_mm_s / 1000.0, force_n, math.nan)
+    return samples, speed_mm_s / 1000.0, force_n, math.nan, None
 
 
 def evenly(samples: Array, duration_s: float) -> Array:
     """Return samples, evenly spaced over a duration, at 320 Hz, (n, n_channels)."""
     from scipy.interpolate import CubicSpline  # noqa: PLC0415 – nothing else in this package needs scipy
 
-    if not 0 < duration_s <= SLOWEST * len(samples) / RATE_HZ:
-        raise ValueError(f'{len(samples)} samples lasted {duration_s:g} s, at {RATE_HZ:g} Hz')
     sample_times = np.linspace(0.0, duration_s, len(samples))
     grid = np.arange(int(duration_s * RATE_HZ) + 1) / RATE_HZ
     values: Array = CubicSpline(sample_times, samples, axis=0)(grid)
@@ -304,7 +293,7 @@ def _fingersense_slide(order: tuple[Any, ...], recorded: AnyArray) -> SteadySlid
     load = recorded.mean(axis=1)
     touching = np.flatnonzero(load > FREE_FRACTION * np.quantile(load, 0.9))
     steady = range(int(touching[0]), int(touching[-1]) + 1) if len(touching) else None
-    return SteadySlide(recorded, abs(speed_mm_s) / 1000.0, force_n, math.copysign(math.pi / 2, speed_mm_s), steady)
+    return recorded, abs(speed_mm_s) / 1000.0, force_n, math.copysign(math.pi / 2, speed_mm_s), steady
 
 
 # --------------------
@@ -341,7 +330,7 @@ IMPORTS: Mapping[str, PublicSet] = {
         order=lambda texture, number: (texture, (int(number),)),
         slide=_steady(
             'signal', partial(_signal, 'lmt/microphone', ('sound',), 'count', 22_050.0),
-            lambda _, recorded: SteadySlide(recorded[:, None], math.nan, math.nan, math.nan), motion='',
+            lambda _, recorded: (recorded[:, None], math.nan, math.nan, math.nan, None), motion='',
         ),
     ),
 }  # fmt: skip
