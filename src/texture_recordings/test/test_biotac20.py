@@ -54,7 +54,7 @@ def test_both_streams_cover_the_common_length_without_a_loss(tmp_path: Path) -> 
     assert sum(len(batch.samples) for batch in fast) == 2 * 600 * 22
     assert sum(len(batch.samples) for batch in slow) == 2 * 600
     assert (fast[0].sampling_rate_hz, slow[0].sampling_rate_hz) == (2200.0, 100.0)
-    assert len(fast[0].samples) == 44
+    assert len(fast[0].samples) == 220
     np.testing.assert_array_equal(slow[0].samples[0], [0, 1, 2, *range(25, 44)])
 
 
@@ -63,7 +63,7 @@ def test_stamps_lie_on_the_ten_millisecond_grid(tmp_path: Path) -> None:
     (bag,) = import_biotac20(source, tmp_path / 'out', slides='1')
     fast = signals(bag, 'signal')
     assert fast[0].stamp_ns == 1_000_000_000 * NANOSECONDS
-    assert {after.stamp_ns - before.stamp_ns for before, after in pairwise(fast)} == {20_000_000}
+    assert {after.stamp_ns - before.stamp_ns for before, after in pairwise(fast)} == {100_000_000}
 
 
 def test_a_state_arrives_before_the_batch_it_covers_and_guarantees_its_length(tmp_path: Path) -> None:

@@ -297,7 +297,7 @@ def test_the_numbers_of_standard_messages_are_channels(tmp_path: Path, column: s
     np.testing.assert_allclose(samples[:, 0], np.sin(20 * np.arange(200) / ACC_HZ), atol=1e-3)
 
 
-def test_streams_of_two_rates_and_a_force_along_the_slide_are_cut_at_the_same_times(tmp_path: Path) -> None:
+def test_streams_of_two_rates_and_a_force_are_cut_at_the_same_times(tmp_path: Path) -> None:
     conditions = {'force': {'column': '/wrench/wrench.force.z'}, 'speed': {'column': '/joints/velocity.finger'}}
     streams = {'signal': '/acc/vector.*', 'signal_static': '/wrench/wrench.force.z'}
     dataset = SlideDataset.from_bags(run_bag(tmp_path, streams, conditions=conditions).bags)
@@ -308,7 +308,6 @@ def test_streams_of_two_rates_and_a_force_along_the_slide_are_cut_at_the_same_ti
     np.testing.assert_allclose(slow[1][:, 0], 1.0 + 2.0 + np.arange(100) / WRENCH_HZ, atol=1e-4)
     np.testing.assert_allclose([slide.force_n for slide in dataset], [2.0, 4.0], atol=0.02)
     np.testing.assert_allclose([slide.speed_m_s for slide in dataset], 0.04)
-    assert len(dataset[0].sliding) == 20  # the force changes along the slide
 
 
 def test_a_bag_without_any_of_the_topics_is_refused(tmp_path: Path) -> None:

@@ -630,12 +630,11 @@ def slide_batches(
     start_ns: int,
     *,
     batch_s: float = BATCH_S,
-    edges: Iterable[int] = (),
 ) -> Iterator[TactileSignal]:
-    """Yield the samples of a slide in batches; each loss and each edge begins a new one."""
+    """Yield the samples of a slide in batches; each loss begins a new one."""
     rate_hz, first = signal.sampling_rate_hz, signal.first_sample
     step = max(1, round(batch_s * rate_hz))
-    borders = {0, *edges, *(np.flatnonzero(np.diff(index) != 1) + 1).tolist(), len(index)}
+    borders = {0, *(np.flatnonzero(np.diff(index) != 1) + 1).tolist(), len(index)}
     for begin, end in pairwise(sorted(borders)):
         for row in range(begin, end, step):
             place, part = int(index[row]), signal.samples[row : min(row + step, end)].astype(np.float32)
@@ -667,8 +666,6 @@ class SlideBags:
         session: str,
         states: Sequence[ExplorationState],
         streams: SlideStreams,
-        batch_s: float = BATCH_S,
-        edges: Sequence[int] = (),
     ) -> None:
         """Write a slide, whose stamps count from 0, and its end into the bag of a session."""
         bag = self._bag(session)
@@ -678,7 +675,7 @@ class SlideBags:
         end_ns = 1
         for topic, (signal, index) in streams.items():
             numbered = replace(signal, first_sample=self._next[session, topic])
-            for batch in slide_batches(numbered, index, self._now_ns, batch_s=batch_s, edges=edges):
+            for batch in slide_batches(numbered, index, self._now_ns):
                 messages.append((batch.end_ns + DELAY_NS, topic, batch))
                 self._next[session, topic] = batch.next_sample
             end_ns = max(end_ns, round(float(index[-1] + 1) / signal.sampling_rate_hz * NANOSECONDS))

@@ -143,7 +143,7 @@ class SlideBorders:
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number that holds for a slide or changes along it."""
+    """A number of which each slide has its mean."""
 
     column: str = param('', 'Names the column, or the field of `files` or `tables`, that holds the number.')
     value: str = param('', 'Number for all slides, in place of a column.')

@@ -20,11 +20,10 @@ from texture_core.cli import progress
 from texture_core.config import Arrays, open_regular, unknown_name
 from texture_core.errors import InvalidData
 from texture_core.types import NANOSECONDS, AnyArray, Array, ExplorationState, Phase, TactileSignal
-from texture_recordings.bags import BATCH_S, SlideBags, SlideStreams, slide_batches
+from texture_recordings.bags import SlideBags, SlideStreams, slide_batches
 from texture_recordings.slides import parse_selection
 
-# States of a slide, streams, length of batches and their further edges, as `SlideBags.write` takes them.
-Recording = tuple[Sequence[ExplorationState], SlideStreams, float, Sequence[int]]
+Recording = tuple[Sequence[ExplorationState], SlideStreams]  # of a slide, as `SlideBags.write` takes them
 
 
 @dataclass(frozen=True)
@@ -140,7 +139,7 @@ def _biotac20_slide(surface: str, order: tuple[Any, ...], arrays: Arrays, _key: 
         'signal': (fast, np.add.outer(PAC_PER_FRAME * places, fast_places).ravel()),
         'signal_static': (slow, places),
     }
-    return states, streams, BIOTAC_BATCH_S, ()
+    return states, streams
 
 
 def frame_indices(frame_time: AnyArray) -> AnyArray:
@@ -202,7 +201,7 @@ def _steady(
             replace(named, phase=phase, stamp_ns=round(row * NANOSECONDS / whole.sampling_rate_hz))
             for phase, row in list(begins.items())[not steady.start :]
         ]
-        return states, {topic: (whole, np.arange(len(samples)))}, BATCH_S, (steady.start, steady.stop)
+        return states, {topic: (whole, np.arange(len(samples)))}
 
     return slide
 

@@ -20,7 +20,7 @@ import numpy as np
 from texture_core.cli import progress
 from texture_core.config import parse_yaml
 from texture_core.errors import InvalidData
-from texture_core.types import NANOSECONDS, AnyArray, Array, ExplorationState, Phase, TactileSignal, checked_label
+from texture_core.types import AnyArray, Array, ExplorationState, Phase, TactileSignal, checked_label
 from texture_recordings.bags import SlideBags, SlideStreams, is_bag, is_cut_off
 from texture_recordings.clock import (
     MAX_LEFT_OUT,
@@ -57,7 +57,6 @@ from texture_recordings.readers import (
 
 PLAUSIBLE_HZ, LIKELY_HZ = (5.0, 200_000.0), (20.0, 20_000.0)
 LONGEST_SLIDE_S = 1800.0
-STATE_S = 0.1  # a state so often where a condition changes along a slide
 SAME_TIME_S = 1e-9
 MAX_NUMBERED = 3  # columns name_1 … name_n beyond this may be samples: the mapping has to tell
 ROWS_A_CODE = 2  # at least, of a column that may name sensors, trials or runs
@@ -546,14 +545,16 @@ class FrameSlides:
             )
         streams = {one.name: self._samples(one, surface, self._frame_rows(rows), begin_s, end_s)
                    for one in self._streams}  # fmt: skip
-        named = ExplorationState(0, f'{self._place}/{number}', self._mapping.motion, Phase.SLIDE, surface=surface)
-        states = self._states(named, times, rows, end_s - begin_s)
+        known: dict[str, Any] = {}
         for name, column in CONDITION_COLUMNS.items():
-            known = [getattr(state, column) for state in states if math.isfinite(getattr(state, column))]
-            if known:
-                self._report.conditions[surface, name].append(self._plausible(name, float(np.mean(known))))
+            mean = self._condition(name, rows)
+            if math.isfinite(mean):
+                self._report.conditions[surface, name].append(self._plausible(name, mean))
+                known[column] = mean
         self._report.slides[surface] += 1
-        return session, states, streams
+        name, motion = f'{self._place}/{number}', self._mapping.motion
+        state = ExplorationState(0, name, motion, Phase.SLIDE, surface=surface, **known)
+        return session, [state], streams
 
     def _named(self, code: str) -> str:
         """Return the name of a label, by number where codes are numbers: 1 names '1.0' and '01', too."""
@@ -618,35 +619,22 @@ class FrameSlides:
             + (f', which may be {" or ".join(likely)}' if likely else '')
         )
 
-    def _states(self, named: ExplorationState, times: Array, rows: slice, slide_s: float) -> list[ExplorationState]:
-        """Return what holds from 0 on, and every 0.1 s after if a condition changes along the slide."""
-        begin_s = float(times[rows].min())
-        tracks = {column: self._track(name, times, rows) for name, column in CONDITION_COLUMNS.items()}
-        changing = any(len(values) > 1 and np.ptp(values) > 0 for _, values in tracks.values())
-        count = max(1, round(slide_s / STATE_S)) if changing else 1
-        states = []
-        for start_s, stop_s in pairwise([*(begin_s + STATE_S * np.arange(count)), math.inf]):
-            means: dict[str, Any] = {column: _mean(*track, start_s, stop_s) for column, track in tracks.items()}
-            states.append(replace(named, stamp_ns=round((start_s - begin_s) * NANOSECONDS), **means))
-        return states
-
-    def _track(self, name: str, times: Array, rows: slice) -> tuple[Array, Array]:
-        """Return times and known values of a condition in SI units, (n,) each; a force and a speed without sign."""
+    def _condition(self, name: str, rows: slice) -> float:
+        """Return the mean of a condition over a slide in SI units, NaN if unknown; a force and a speed without sign."""
         quantity = self._mapping.conditions.get(name, Quantity())
         if quantity.column and self._frame[quantity.column].ndim:
-            times, values = times[rows], self._aligned(self._numbers, quantity.column, rows)
+            values = self._aligned(self._numbers, quantity.column, rows)
         else:
             text = str(self._frame[quantity.column]) if quantity.column else quantity.value or 'nan'
-            times, values = times[rows][:1], np.array([number_of(text)])
+            values = np.array([number_of(text)])
             if np.isnan(values[0]) and text != 'nan':
                 raise InvalidData(f"'{quantity.column}' is '{text}' in its name; a number is needed there")
-        times, values = times[np.isfinite(values)], values[np.isfinite(values)]
-        values = values * CONDITION_UNITS[name].get(quantity.unit, 1.0)
+        values = values[np.isfinite(values)] * CONDITION_UNITS[name].get(quantity.unit, 1.0)
         if name == 'direction' and len(values):  # 359° next to 1° is 361°
             values -= math.tau * np.round((values - values[0]) / math.tau)
         values = np.abs(values) if name == 'speed' else values
-        negative = name == 'force' and len(values) and values.mean() < 0
-        return times, -values if negative else values
+        mean = float(values.mean()) if len(values) else math.nan
+        return abs(mean) if name == 'force' else mean
 
 
 def _is_one_of(text: str, wanted: Sequence[str]) -> bool:
@@ -678,11 +666,3 @@ def _mixed(values: AnyArray, *, named: bool) -> int:
         in_turn = len(changes) > 0.5 * len(codes) and (codes[count:] == codes[:-count]).mean() > IN_TURN
         mixed = not (found % 1.0).any() and (in_blocks or (count <= MAX_TURNS and bool(in_turn)))
     return int(changes[0]) if mixed else 0
-
-
-def _mean(times: Array, values: Array, begin_s: float, end_s: float) -> float:
-    """Return the mean of values between two times; the last one before where there is none."""
-    if len(values) <= 1:
-        return float(values[0]) if len(values) else math.nan
-    inside = values[(times >= begin_s) & (times < end_s)]
-    return float(inside.mean()) if len(inside) else float(values[max(0, int(np.searchsorted(times, begin_s)) - 1)])
