@@ -38,7 +38,7 @@ class PublicSet:
     key: str  # pattern of the name of a file and of an array in it that is a slide, or the first one of a slide
     order: Callable[..., tuple[str, tuple[Any, ...]]]  # groups of the key → surface, and what its slides are sorted by
     slide: Callable[[str, tuple[Any, ...], Arrays, str], Recording]  # of a surface, that order, and the array in a file
-    session: Callable[[str, tuple[Any, ...]], str] = lambda surface, _: surface  # name of the bag
+    dated: bool = False  # a bag for each first member of the order, not for each surface
 
     def __call__(
         self, source: str | Path, out: str | Path, slides: str = '', materials: Sequence[str] = ()
@@ -58,12 +58,13 @@ class PublicSet:
                         surface, order = self.order(*match.groups())
                         found[surface].append((order, file, key))
             chosen = _chosen(found, slides, materials)
-            chosen.sort(key=lambda slide: self.session(*slide[:2]))
+            if self.dated:
+                chosen.sort(key=lambda slide: str(slide[1][0]))
             bags = opened.enter_context(SlideBags(out))
             for surface, order, file, key in progress(chosen, 'import slides', len(chosen)):
                 with _reading(file):
                     recording = self.slide(surface, order, contents[file], key)
-                bags.write(self.session(surface, order), *recording)
+                bags.write(order[0] if self.dated else surface, *recording)
         return bags.paths
 
 
@@ -319,7 +320,7 @@ IMPORTS: Mapping[str, PublicSet] = {
         '2021-*.npz', r'[^/]+/(\d{4}-\d\d-\d\d)/([^/]+)/(\d+(?:\.\d+)?)N/(-?\d+)mms(?:/(\d+))?',
         order=lambda date, fabric, force, speed, repeat: (fabric, (date, float(force), int(speed), int(repeat or 0))),
         slide=_steady('signal_static', partial(_signal, *CPM, NOMINAL_HZ), _fingersense_slide),
-        session=lambda _, order: str(order[0]),
+        dated=True,
     ),
     # Contact sound of 29 textures that a tool strokes by hand (Strese et al. 2014), as stored in the history of
     # github shinolab/vibrotactile-autoencoder, joined into one file. The whole stroke counts as sliding; speed, force
