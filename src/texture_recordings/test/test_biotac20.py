@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_core.errors import InvalidData, UnknownName
 from texture_core.types import NANOSECONDS, Phase, TactileSignal, lost_samples
 from texture_recordings.bags import read_bag
 from texture_recordings.dataset import SlideDataset
@@ -118,17 +117,3 @@ def test_the_sign_follows_the_rule_sample_by_sample() -> None:
         negative = line < 0 or (line == 0 and expected[k - 1] < 0)
         expected[k] = -rectified[k] if negative else rectified[k]
     np.testing.assert_array_equal(restore_sign(rectified), expected)
-
-
-def test_a_wrong_source_material_or_slide_is_refused_with_a_sentence(tmp_path: Path) -> None:
-    source = make_source(tmp_path / 'in')
-    (tmp_path / 'broken').mkdir()
-    (tmp_path / 'broken' / 'material01.npz').write_bytes(b'nothing')
-    with pytest.raises(InvalidData, match=r'no file material\*.npz'):
-        import_biotac20(tmp_path, tmp_path / 'out')
-    with pytest.raises(InvalidData, match='is not a file of this data set'):
-        import_biotac20(tmp_path / 'broken', tmp_path / 'out')
-    with pytest.raises(UnknownName, match="did you mean 'material07'"):
-        import_biotac20(source, tmp_path / 'out', materials=['material70'])
-    with pytest.raises(InvalidData, match='none of the requested slides'):
-        import_biotac20(source, tmp_path / 'out', slides='50')

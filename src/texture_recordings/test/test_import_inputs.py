@@ -21,7 +21,7 @@ from texture_core.errors import InvalidData
 from texture_recordings.bags import CheckedPath, message_types
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.mapping import mapping_from
-from texture_recordings.readers import MAPPED
+from texture_recordings.readers import MAPPED, frames
 from texture_recordings.tables import import_tables
 
 N = 600
@@ -620,10 +620,6 @@ def test_sizes(tmp_path: Path, name: str) -> None:
     check(tmp_path, write, {**ANY, **RATE}, sentence)
 
 
-def test_a_matlab_file_of_ordinary_size_is_read(tmp_path: Path) -> None:
-    check(tmp_path, lambda folder: scipy.io.savemat(folder / 'cork_1.mat', {'x': X}), {**ANY, **RATE}, CORK)
-
-
 def run(folder: Path, kinds: tuple[str, ...] = MAPPED['table'], **content: Any) -> Any:
     """Import what lies in a folder, by time in column t unless given otherwise."""
     source = content.pop('source', folder)
@@ -759,28 +755,11 @@ def test_means_of_conditions_are_those_of_angles_and_magnitudes(
     assert np.sin(value - mean) == pytest.approx(0.0, abs=5e-3)
 
 
-def test_of_a_bag_only_what_the_mapping_means_counts(tmp_path: Path) -> None:
-    kind, store = 'sensor_msgs/msg/Imu', STORE
-    value = store.types[kind]
-    header, time, vector, quaternion = (store.types[one] for one in (
-        'std_msgs/msg/Header', 'builtin_interfaces/msg/Time', 'geometry_msgs/msg/Vector3',
-        'geometry_msgs/msg/Quaternion',
-    ))  # fmt: skip
-    count, none = 24_000, np.zeros(9)  # a minute
-    with Writer(tmp_path / 'cork_1', version=8, storage_plugin=StoragePlugin.MCAP) as writer:
-        connection = writer.add_connection('/imu', kind, typestore=store)
-        for row in range(count):
-            at_ns = START_NS + row * 2_500_000
-            stamp = header(stamp=time(sec=at_ns // 10**9, nanosec=at_ns % 10**9), frame_id='a')
-            rest, still = quaternion(x=0.0, y=0.0, z=0.0, w=1.0), vector(x=0.0, y=0.0, z=0.0)
-            touched = vector(x=float(X[row % N]), y=0.0, z=0.0)
-            message = value(header=stamp, orientation=rest, orientation_covariance=none, angular_velocity=still,
-                            angular_velocity_covariance=none, linear_acceleration=touched,
-                            linear_acceleration_covariance=none)  # fmt: skip
-            writer.write(connection, at_ns, store.serialize_cdr(message, kind))
-    streams = {'signal': {'columns': ['/imu/linear_acceleration.*']}}
-    report = run(tmp_path, MAPPED['bag'], files='{material}_{run}', streams=streams)
-    assert report.streams['cork', 'signal']['samples'] == count
+def test_of_a_message_only_what_the_mapping_means_and_what_may_be_a_code_is_kept(tmp_path: Path) -> None:
+    bag()(tmp_path)
+    mapping = mapping_from({'streams': {'signal': {'columns': ['/p/point.x']}}, 'label': {'value': 'cork'}})
+    [table] = frames(tmp_path / 'a_1', 'a_1', mapping)
+    assert list(table.columns) == ['/p/time', '/p/header.frame_id', '/p/point.x']
 
 
 def test_a_cut_bag_is_not_loaded_whole(tmp_path: Path) -> None:

@@ -12,9 +12,9 @@ from texture_core.cli import progress
 from texture_core.errors import InvalidData
 from texture_core.types import ExplorationState, Phase, TactileSignal
 from texture_features.segmentation import SegmentationParams, segment_recording
-from texture_recordings.bags import BagWriter, find_bags, read_bag, read_named
+from texture_recordings.bags import EXPLORATION, BagWriter, find_bags, read_bag, read_named
 
-FAST_TOPIC, STATE_TOPIC = 'signal', 'exploration'
+FAST_TOPIC = 'signal'
 
 
 def segment_bags(
@@ -39,8 +39,8 @@ def segment_bags(
 def _segment(path: Path, out: Path, params: SegmentationParams, surface: str, namespace: str | None) -> int:
     signals: list[TactileSignal] = []
     reported: list[ExplorationState] = []
-    for topic, _, value in read_bag(path, (FAST_TOPIC, STATE_TOPIC), namespace):
-        (reported if topic == STATE_TOPIC else signals).append(value)
+    for topic, _, value in read_bag(path, (FAST_TOPIC, EXPLORATION), namespace):
+        (reported if topic == EXPLORATION else signals).append(value)
     if not signals:
         raise InvalidData(f"the bag '{path}' has no '{FAST_TOPIC}' to find slides in; also record the vibration")
     found = segment_recording(signals, params, exploration_id=path.name)
@@ -48,12 +48,12 @@ def _segment(path: Path, out: Path, params: SegmentationParams, surface: str, na
     with BagWriter(out) as bag:
         prefix = ''
         for name, message in read_named(path, namespace):
-            if name != STATE_TOPIC:
+            if name != EXPLORATION:
                 bag.write_raw(message)
             if message.topic != '/diagnostics':
                 prefix = message.topic.removesuffix(f'/{name}')
         for state in states:
-            bag.write(f'{prefix}/{STATE_TOPIC}', state, state.stamp_ns)
+            bag.write(f'{prefix}/{EXPLORATION}', state, state.stamp_ns)
     return sum(state.phase is Phase.SLIDE for state in states)
 
 
