@@ -40,9 +40,9 @@ def test_the_slides_found_are_those_that_the_explorer_reported(bag, tmp_path):
 
 def test_a_bag_without_states_gets_labelled_slides(bag, tmp_path):
     bare = tmp_path / 'bare'
-    with BagWriter(bare, namespace='left') as writer:
+    with BagWriter(bare) as writer:
         for topic, log_ns, value in read_bag(bag, ('signal', 'signal_static')):
-            writer.write(topic, value, log_ns)
+            writer.write(f'left/{topic}', value, log_ns)
     [path] = segment_bags([bare], tmp_path / 'found', SegmentationParams(), surface='oak')
     assert [slide.name for slide in find_slides([path])] == ['oak/1', 'oak/2', 'oak/3']
 

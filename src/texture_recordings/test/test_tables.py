@@ -141,27 +141,15 @@ def test_a_mapping_that_does_not_fit_is_refused_with_the_place(
         ),
         ({'slides': {'by': 'label'}}, 'mapping, slides: .* allowed is one of file, column, pause, row'),
         ({'conditions': {'speed': {'unit': 'mph'}}}, "the unit of speed is 'mph'; use one of m/s, cm/s, mm/s"),
-        ({'files': '{a}{b}.csv'}, 'fields without text between'),
         ({'files': '{a}_{a}.csv'}, 'has a field twice'),
         ([], 'a mapping of parameter names to values is needed'),
         ({'streams': {'signal': {'columns': ['a'], 'scale': math.inf}}}, "'scale' is inf; allowed is a finite number"),
-        (
-            {'streams': {'signal': {'columns': ['a'], 'rate_hz': 1e-9}}},
-            "'rate_hz' is 1e-09; allowed are 0 and 0.001 to",
-        ),
         ({'streams': {'signal': {'columns': ['a'], 'rate_hz': 10**5000}}}, "'rate_hz' is inf; allowed is 0.0 to"),
     ],
 )
 def test_a_mapping_that_makes_no_sense_is_refused_with_a_sentence(content: object, sentence: str) -> None:
     with pytest.raises(InvalidParameter, match=sentence):
         mapping_from(content)
-
-
-def test_a_column_whose_name_is_a_long_number_is_refused_with_a_sentence(tmp_path: Path) -> None:
-    save(tmp_path, x=np.arange(300.0))
-    mapping = mapping_from({'streams': {'signal': {'columns': [f'1-{"9" * 30_000}']}}, 'label': {'value': 'cork'}})
-    with pytest.raises(InvalidData, match=r"no column '1-9+"):
-        import_tables(mapping, tmp_path / 'in', tmp_path / 'out')
 
 
 def test_a_column_in_braces_and_whole_numbers_are_names() -> None:
@@ -302,7 +290,7 @@ def test_the_numbers_of_standard_messages_are_channels(tmp_path: Path, column: s
     np.testing.assert_allclose(samples[:, 0], np.sin(20 * np.arange(200) / ACC_HZ), atol=1e-3)
 
 
-def test_streams_of_two_rates_and_a_force_along_the_slide_are_cut_at_the_same_times(tmp_path: Path) -> None:
+def test_streams_of_two_rates_and_a_force_are_cut_at_the_same_times(tmp_path: Path) -> None:
     conditions = {'force': {'column': '/wrench/wrench.force.z'}, 'speed': {'column': '/joints/velocity.finger'}}
     streams = {'signal': '/acc/vector.*', 'signal_static': '/wrench/wrench.force.z'}
     dataset = SlideDataset.from_bags(run_bag(tmp_path, streams, conditions=conditions).bags)
@@ -313,7 +301,6 @@ def test_streams_of_two_rates_and_a_force_along_the_slide_are_cut_at_the_same_ti
     np.testing.assert_allclose(slow[1][:, 0], 1.0 + 2.0 + np.arange(100) / WRENCH_HZ, atol=1e-4)
     np.testing.assert_allclose([slide.force_n for slide in dataset], [2.0, 4.0], atol=0.02)
     np.testing.assert_allclose([slide.speed_m_s for slide in dataset], 0.04)
-    assert len(dataset[0].sliding) == 20  # the force changes along the slide
 
 
 def test_a_bag_without_any_of_the_topics_is_refused(tmp_path: Path) -> None:

@@ -8,39 +8,40 @@ import io
 import logging
 import os
 import re
+import shutil
 import struct
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from functools import cache, partial
 from itertools import pairwise
 from pathlib import Path
-from types import SimpleNamespace
-from typing import IO, Any, BinaryIO, Literal, NamedTuple
+from typing import IO, Any, BinaryIO, NamedTuple, cast
 from zlib import crc32
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
 from texture_core.config import MB, FileRefused, folder, open_regular, parse_yaml, read_text
-from texture_core.errors import InvalidData, MissingLibrary
+from texture_core.errors import InvalidData, MissingLibrary, TextureError
 from texture_core.types import (
     DATA_CLASSES,
     NANOSECONDS,
     QUALITIES,
     Array,
     ExplorationRequest,
+    ExplorationState,
     MessageCodec,
+    Phase,
     Quality,
     TactileSignal,
+    checked_label,
 )
 
 try:
-    import apsw
     import lz4.frame
-    import rosbags.rosbag2.reader
     from rosbags.interfaces import (
         Connection,
         MessageDefinitionFormat,
@@ -62,7 +63,6 @@ try:
     )
     from rosbags.serde import SerdeError
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-    from rosbags.typesys.base import TypesysError
     from rosbags.typesys.store import Typestore
 
     if sys.version_info >= (3, 14):
@@ -88,36 +88,9 @@ END = b'\x02' + (20).to_bytes(8, 'little') + bytes(20) + MAGIC
 FOOTER_BYTES, CHECKSUM_FROM_END = len(END), 12
 
 
-class _Unpacked(zstd.ZstdFile):
-    """What zstd packed, up to the limit."""
-
-    def __init__(self, packed: BinaryIO, mode: Literal['rb'] = 'rb') -> None:
-        self._size, self._given = packed.seek(0, io.SEEK_END), 0
-        packed.seek(0)
-        super().__init__(packed, mode)
-
-    def read(self, size: int | None = -1) -> bytes:
-        """Return the next bytes; FileRefused beyond the limit."""
-        part = super().read(max(MAX_UNPACKED_BYTES, MAX_RATIO * self._size) + 1 if size is None or size < 0 else size)
-        self._given += len(part)
-        _check_unpacked(self._given, self._size)
-        return part
-
-
-def _check_unpacked(unpacked: int, size: int) -> None:
-    most = max(MAX_UNPACKED_BYTES, MAX_RATIO * size)
-    if unpacked > most:
-        raise FileRefused(
-            f'it unpacks from {size / MB:.3g} MB to more than the {most / MB:.0f} MB that are allowed; cut or split it'
-        )
-
-
-# rosbags unpacks whatever comes; here it stops at what a chunk declares, or at the limit.
-storage_mcap.DECOMPRESSORS['zstd'] = lambda data, size: _Unpacked(io.BytesIO(data)).read(size + 1)
-storage_mcap.DECOMPRESSORS['lz4'] = lambda data, size: lz4.frame.open(io.BytesIO(data)).read(size + 1)
-vars(rosbags.rosbag2.reader)['zstd'] = SimpleNamespace(
-    open=_Unpacked, decompress=lambda data: _Unpacked(io.BytesIO(data)).read()
-)
+# rosbags unpacks whatever comes; here it stops at what a chunk declares.
+storage_mcap.DECOMPRESSORS['zstd'] = lambda data, size: zstd.ZstdDecompressor().decompress(data, size + 1)
+storage_mcap.DECOMPRESSORS['lz4'] = lambda data, size: lz4.frame.LZ4FrameDecompressor().decompress(data, size + 1)
 
 
 class CheckedPath(type(Path())):  # type: ignore[misc]
@@ -136,42 +109,29 @@ class CheckedPath(type(Path())):  # type: ignore[misc]
         if whole:
             return file
         logging.getLogger(__name__).warning("'%s' was cut off; it is read up to its last whole chunk", self)
-        return io.BufferedReader(_Ended(file, end))
+        return cast('IO[Any]', _Ended(file, end))
 
     def read_text(self, encoding: str | None = None, errors: str | None = None) -> str:
         """Return the text of a short file."""
         return read_text(self, MAX_METADATA_BYTES, encoding or 'utf-8')
 
 
-class _Ended(io.RawIOBase):
-    """The first bytes of a file, and the end that it lacks."""
+class _Ended:
+    """A file up to its last whole chunk, behind which it has the end that it lacks."""
 
     def __init__(self, file: BinaryIO, length: int) -> None:
-        self._file, self._length, self._at = file, length, 0
-
-    def readable(self) -> bool:
-        return True
-
-    def seekable(self) -> bool:
-        return True
+        self._file, self._length = file, length
+        self.tell, self.close = file.tell, file.close
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        self._at = offset + {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: self._length + len(END)}[whence]
-        return self._at
+        """Go to a place; from the end on, to where the end that is lacking begins."""
+        if whence == io.SEEK_END:
+            return self._file.seek(self._length)
+        return self._file.seek(offset, whence)
 
-    def readinto(self, buffer: Any) -> int:
-        if self._at < self._length:
-            self._file.seek(self._at)
-            part = self._file.read(min(len(buffer), self._length - self._at))
-        else:
-            part = END[self._at - self._length :][: len(buffer)]
-        buffer[: len(part)] = part
-        self._at += len(part)
-        return len(part)
-
-    def close(self) -> None:
-        self._file.close()
-        super().close()
+    def read(self, size: int = -1) -> bytes:
+        """Return the next bytes."""
+        return END if self._file.tell() == self._length else self._file.read(size)
 
 
 def _has_end(file: BinaryIO) -> bool:
@@ -204,7 +164,11 @@ def _end_of_chunks(file: BinaryIO) -> int:
             break
         if kind == CHUNK:
             unpacked += int.from_bytes(file.read(CHUNK_HEAD.size)[16:24], 'little')
-            _check_unpacked(unpacked, size)
+            if unpacked > (most := max(MAX_UNPACKED_BYTES, MAX_RATIO * size)):
+                raise FileRefused(
+                    f'it unpacks from {size / MB:.3g} MB to more than the {most / MB:.0f} MB that are allowed; cut or '
+                    'split it'
+                )
             chunks.append((at - length, length))
         end = at
     while chunks and not _is_whole(file, *chunks[-1]):
@@ -344,12 +308,6 @@ def _folder(topic: str) -> str:
 
 # --------------------
 # Find and read recordings: rosbag2 folders with MCAP inside, which `ros2 bag` opens too; no ROS is needed.
-
-# What the reader raises, depending on which byte of a file is wrong.
-BROKEN = (
-    ReaderError, TypesysError, zstd.ZstdError, apsw.Error, yaml.YAMLError, OSError, EOFError, struct.error,
-    RuntimeError, ValueError, LookupError, TypeError, AttributeError, AssertionError, MemoryError, OverflowError,
-)  # fmt: skip
 
 
 class RawMessage(NamedTuple):
@@ -494,7 +452,9 @@ def _read(
                 yield name, RawMessage(connection.topic, connection.msgtype, log_ns, data)
             if missing and start_ns is None and stop_ns is None:
                 raise ReaderError(f'{missing} of its messages are missing')
-    except BROKEN as error:
+    except TextureError:
+        raise
+    except Exception as error:  # whatever the reader raises, which depends on the byte that is wrong
         raise InvalidData(
             f"the bag '{path}' cannot be read, it is damaged or cut off: {error}; record it again"
         ) from error
@@ -505,65 +465,11 @@ def _files(path: Path) -> list[Path]:
     if not path.is_dir():
         return [path]
     facts = parse_yaml((path / 'metadata.yaml').read_text(encoding='utf-8'))['rosbag2_bagfile_information']
+    mode = str(facts.get('compression_mode', '')).lower()
+    if mode in {'file', 'message'}:
+        raise FileRefused(f'it is compressed by {mode}, and storage alone is read so; unpack it by ros2 bag convert')
     # As rosbags finds them: next to the metadata, whatever folder the entry names.
     return [path / Path(str(name)).name for name in facts['relative_file_paths']]
-
-
-# --------------------
-# Whether streams of samples arrive without gaps.
-
-
-class Continuity:
-    """Count lost samples and restarts of streams, from the running index of their batches."""
-
-    def __init__(self) -> None:
-        self.samples: Counter[str] = Counter()
-        self.lost: Counter[str] = Counter()
-        self.restarts: Counter[str] = Counter()
-        self._next: dict[str, int] = {}
-
-    @property
-    def losses(self) -> str:
-        """What was lost, in words, '' if nothing; losses in a restart, which numbers from 0, are unknown."""
-        lost, restarts = self.lost.total(), self.restarts.total()
-        unknown = f'unknown losses in {restarts} restart{"s" if restarts > 1 else ""} of a driver or bridge'
-        return ', and '.join(filter(None, (f'{lost} samples lost' if lost else '', unknown if restarts else '')))
-
-    def update(self, stream: str, signal: TactileSignal) -> None:
-        """Take the next batch of a stream; an index that goes back is a restart of its driver, not a loss."""
-        jump = signal.first_sample - self._next.get(stream, signal.first_sample)
-        self.samples[stream] += len(signal.samples)
-        self.lost[stream] += max(0, jump)
-        self.restarts[stream] += jump < 0
-        self._next[stream] = signal.next_sample
-
-
-# --------------------
-# Slides of others, which have no log times and mostly no stamps: these are made up.
-
-START_NS, PAUSE_NS = 1_000_000_000 * NANOSECONDS, NANOSECONDS  # where the first slide begins, and between two of them
-BATCH_S = 0.1
-DELAY_NS = 100_000  # a batch is logged this long after its last sample
-
-
-def slide_batches(
-    like: TactileSignal,
-    samples: Array,
-    index: NDArray[Any],
-    start_ns: int,
-    *,
-    batch_s: float = BATCH_S,
-    edges: Iterable[int] = (),
-) -> Iterator[TactileSignal]:
-    """Yield the samples of a slide in batches; each loss and each edge begins a new one."""
-    rate_hz, first = like.sampling_rate_hz, like.first_sample
-    step = max(1, round(batch_s * rate_hz))
-    borders = {0, *edges, *(np.flatnonzero(np.diff(index) != 1) + 1).tolist(), len(index)}
-    for begin, end in pairwise(sorted(borders)):
-        for row in range(begin, end, step):
-            place, part = int(index[row]), samples[row : min(row + step, end)].astype(np.float32)
-            stamp_ns = start_ns + round(place / rate_hz * NANOSECONDS)
-            yield replace(like, stamp_ns=stamp_ns, first_sample=first + place, samples=part)
 
 
 # --------------------
@@ -599,9 +505,8 @@ def quality_of(topic: str) -> Quality | None:
 class BagWriter:
     """Write a new bag; use it in a `with` block, at the end of which the bag is complete."""
 
-    def __init__(self, path: str | Path, namespace: str = '/') -> None:
+    def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        self._namespace = '/' + namespace.strip('/')
         self._connections: dict[tuple[str, str], Connection] = {}
         self.qualities: dict[str, Quality] = {}  # of topics unknown to `quality_of`, as they were offered
         if self.path.exists():
@@ -661,7 +566,7 @@ class BagWriter:
         file.seek(0, os.SEEK_END)
 
     def _connect(self, topic: str, msgtype: str) -> Connection:
-        name = topic if topic.startswith('/') else f'{self._namespace.rstrip("/")}/{topic}'
+        name = topic if topic.startswith('/') else f'/{topic}'
         quality = quality_of(name) or self.qualities.get(name)
         # For `ros2 bag play`, which offers what was offered when it was recorded.
         qos = [_offered(quality)] if quality else []
@@ -672,3 +577,104 @@ class BagWriter:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+# --------------------
+# Slides of others, which have no log times and mostly no stamps: these are made up.
+
+START_NS, PAUSE_NS = 1_000_000_000 * NANOSECONDS, NANOSECONDS  # where the first slide begins, and between two of them
+BATCH_S = 0.1
+DELAY_NS = 100_000  # a batch is logged this long after its last sample
+MAX_BAGS = 500
+
+# By topic: all samples of a slide, and their places on the grid, (n,).
+SlideStreams = Mapping[str, tuple[TactileSignal, NDArray[Any]]]
+
+
+def slide_batches(
+    signal: TactileSignal,
+    index: NDArray[Any],
+    start_ns: int,
+    *,
+    batch_s: float = BATCH_S,
+) -> Iterator[TactileSignal]:
+    """Yield the samples of a slide in batches; each loss begins a new one."""
+    rate_hz, first = signal.sampling_rate_hz, signal.first_sample
+    step = max(1, round(batch_s * rate_hz))
+    borders = {0, *(np.flatnonzero(np.diff(index) != 1) + 1).tolist(), len(index)}
+    for begin, end in pairwise(sorted(borders)):
+        for row in range(begin, end, step):
+            place, part = int(index[row]), signal.samples[row : min(row + step, end)].astype(np.float32)
+            stamp_ns = start_ns + round(place / rate_hz * NANOSECONDS)
+            yield replace(signal, stamp_ns=stamp_ns, first_sample=first + place, samples=part)
+
+
+class SlideBags:
+    """Bags below a folder, written slide by slide; use it in a `with` block, where an error removes them again.
+
+    Each slide begins a second after the one before, in whatever bag that is, so slides keep their order over all bags.
+    Without a folder nothing is written.
+    """
+
+    def __init__(self, out: str | Path | None) -> None:
+        self._out = None if out is None else Path(out)
+        self._open = ExitStack()
+        self._bags: dict[str, BagWriter] = {}
+        self._next: Counter[tuple[str, str]] = Counter()
+        self._now_ns = START_NS
+
+    @property
+    def paths(self) -> list[Path]:
+        """Paths of the bags in the order in which they were begun."""
+        return [bag.path for bag in self._bags.values()]
+
+    def write(
+        self,
+        session: str,
+        states: Sequence[ExplorationState],
+        streams: SlideStreams,
+    ) -> None:
+        """Write a slide, whose stamps count from 0, and its end into the bag of a session."""
+        bag = self._bag(session)
+        if bag is None:
+            return
+        messages: list[tuple[int, str, Any]] = []
+        end_ns = 1
+        for topic, (signal, index) in streams.items():
+            numbered = replace(signal, first_sample=self._next[session, topic])
+            for batch in slide_batches(numbered, index, self._now_ns):
+                messages.append((batch.end_ns + DELAY_NS, topic, batch))
+                self._next[session, topic] = batch.next_sample
+            end_ns = max(end_ns, round(float(index[-1] + 1) / signal.sampling_rate_hz * NANOSECONDS))
+        ends = [replace(states[-1], stamp_ns=end_ns, phase=phase) for phase in (Phase.LIFT, Phase.DONE)]
+        for state, after in pairwise([*states, *ends[states[-1].phase is Phase.LIFT :], ends[-1]]):
+            at_ns, steady_s = self._now_ns + state.stamp_ns, max(0, after.stamp_ns - state.stamp_ns) / NANOSECONDS
+            # Before the first batch that it covers, and after those before it.
+            log_ns = at_ns + DELAY_NS * (2 * (state.stamp_ns > 0) + (state.phase is Phase.DONE))
+            stamped = replace(state, stamp_ns=at_ns, steady_s=steady_s, progress=state.stamp_ns / end_ns)
+            messages.append((log_ns, EXPLORATION, stamped))
+        bag.write_all(messages)
+        self._now_ns += end_ns + PAUSE_NS
+
+    def _bag(self, session: str) -> BagWriter | None:
+        if session not in self._bags:
+            name = checked_label(session)
+            if not name or name.startswith('.') or len(self._bags) >= MAX_BAGS:
+                raise InvalidData(
+                    f"no bag can be named '{name}' as the {len(self._bags) + 1}th; at most {MAX_BAGS} bags with plain "
+                    'names are made, choose another `session`'
+                )
+            if self._out is None:
+                return None
+            self._out.mkdir(parents=True, exist_ok=True)
+            self._bags[session] = self._open.enter_context(BagWriter(self._out / name))
+        return self._bags[session]
+
+    def __enter__(self) -> SlideBags:
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self._open.__exit__(*error)
+        if error[0]:
+            for path in self.paths:
+                shutil.rmtree(path, ignore_errors=True)

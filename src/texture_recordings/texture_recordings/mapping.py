@@ -11,7 +11,7 @@ from pathlib import Path
 
 from texture_core.config import find_file, from_mapping, load_yaml, param, unknown_name
 from texture_core.errors import InvalidData, InvalidParameter
-from texture_core.types import MAX_HZ, MIN_HZ
+from texture_core.types import MAX_HZ
 from texture_recordings.slides import STREAMS
 
 FIELD = re.compile(r'\{(\w*)(:d)?\}|\*')
@@ -44,15 +44,6 @@ def template_fields(template: str, name: str) -> dict[str, str] | None:
             'digits as {code:d}, or rename the files'
         )
     return {key: text for key, text in zip(names, found[0], strict=True) if key}
-
-
-def _checked_template(template: str) -> None:
-    """Refuse a template whose fields follow each other without text between, or that names one twice."""
-    if '' in FIELD.sub('\0', template).split('\0')[1:-1]:
-        raise InvalidParameter(f"the template '{template}' has fields without text between; put text there")
-    names = [match[1] for match in FIELD.finditer(template) if match[1]]
-    if len(set(names)) < len(names):
-        raise InvalidParameter(f"the template '{template}' has a field twice; give each a different name")
 
 
 TIME_UNITS: Mapping[str, float] = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'min': 60.0}
@@ -115,12 +106,6 @@ class StreamColumns:
     )
     time: TimeColumn = field(default_factory=TimeColumn)
 
-    def __post_init__(self) -> None:
-        if 0.0 < self.rate_hz < MIN_HZ:
-            raise InvalidParameter(
-                f"parameter 'rate_hz' is {self.rate_hz:g}; allowed are 0 and {MIN_HZ:g} to {MAX_HZ:g}"
-            )
-
 
 @dataclass(frozen=True)
 class LabelColumn:
@@ -158,7 +143,7 @@ class SlideBorders:
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number that holds for a slide or changes along it."""
+    """A number of which each slide has its mean."""
 
     column: str = param('', 'Names the column, or the field of `files` or `tables`, that holds the number.')
     value: str = param('', 'Number for all slides, in place of a column.')
@@ -196,8 +181,10 @@ class TableMapping:
     motion: str = param('linear_slide', 'Names the motion in the bags.')
 
     def __post_init__(self) -> None:
-        for template in filter(None, (self.files, self.tables)):
-            _checked_template(template)
+        for template in (self.files, self.tables):
+            names = [match[1] for match in FIELD.finditer(template) if match[1]]
+            if len(set(names)) < len(names):
+                raise InvalidParameter(f"the template '{template}' has a field twice; give each a different name")
         for name, quantity in self.conditions.items():
             if name not in CONDITION_UNITS:
                 raise unknown_name(name, CONDITION_UNITS, 'condition')

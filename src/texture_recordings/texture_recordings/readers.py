@@ -15,7 +15,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from itertools import chain, islice, takewhile
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -27,13 +27,12 @@ from texture_core.types import MAX_HZ, NANOSECONDS, AnyArray, Array
 from texture_recordings.bags import is_bag, message_types, read_foreign
 from texture_recordings.mapping import FileFormat, TableMapping, template_fields
 
-MAX_FILE_BYTES = 1000 * MB
+MAX_FILE_BYTES, MAX_TEXT_BYTES = 1000 * MB, 200 * MB
 MAX_VALUES = 8_000_000  # of 8 bytes, of one file; a larger file may have as many as it has bytes
 EXAMPLES = 3
 RANGE = re.compile(r'(\D*)(\d{1,9})-(?:\1)?(\d{1,9})')
 MAX_RANGE = 10_000
 TRIAL = 'trial'  # number of the first axis of arrays (n_trials, n_samples, n_channels)
-MAX_ARRAYS = 50_000  # data sets of an HDF5 file
 MAX_CHANNELS = 10_000  # more are samples: the array lies on its side
 MAX_TEXT = 200  # characters of a cell that is shown or a label
 
@@ -87,7 +86,7 @@ def chosen(wanted: Sequence[str], names: Sequence[str]) -> list[str]:
         meant = [name]
         if name not in names and match and 0 <= int(match[3]) - int(match[2]) < MAX_RANGE:
             meant = [f'{match[1]}{number}' for number in range(int(match[2]), int(match[3]) + 1)]
-        elif name not in names and len(name) <= 100:
+        elif name not in names:
             meant = [one for one in names if one and fnmatch.fnmatchcase(one, name)] or [name]
         if unknown := [one for one in meant if one not in names]:
             raise unknown_name(unknown[0], names, 'column')
@@ -141,7 +140,6 @@ def frames(path: Path, place: str, mapping: TableMapping) -> Iterator[TableFrame
 # ---- text files
 
 DELIMITERS = (',', ';', '\t', '|', ' ')
-BLOCK_ROWS = 20_000  # which are parsed at once
 NO_TEXT = frozenset(('nan', 'na', 'n/a', '#n/a', 'null'))  # 'none' may be a label
 BLANK = frozenset(('', 'nan', 'na', 'null', 'none'))
 NO_WORD = NO_TEXT | BLANK | {'inf', '-inf', '+inf'}
@@ -153,79 +151,65 @@ NUMERIC = 0.9  # share of numbers in a column of numbers
 def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:
     """Yield the columns of a text file: numbers where the mapping wants them or nine of ten cells are some, or texts.
 
-    A row is malformed if it has other cells than the first one, or a text in a column whose numbers the mapping uses;
-    above the samples and below them also if it has a word in another column of numbers, as rows of units and means do.
+    A row is malformed if it has other cells than the first one, or a text in a column whose numbers the mapping uses.
+    A word in another column of numbers is refused, as rows of units and means have one.
     """
-    form, parts = mapping.format, list[dict[str, AnyArray]]()
-    lines, junk, reasons = list[AnyArray](), list[AnyArray](), list[str]()
-    words: dict[str, int] = {}  # in unused columns of numbers: the row of one that is there once, -1 of another
-    with open_regular(path) as opened:
+    form, lines = mapping.format, list[tuple[int, str]]()
+    with open_regular(path, MAX_TEXT_BYTES) as opened:
         # The names of the columns, and those that the mapping wants as numbers.
         rest = _lines(opened, form)
         first = next(rest, (0, ''))
-        rest = rest if form.header else chain([first], rest)
         delimiter = form.delimiter or next((one for one in DELIMITERS if one in first[1]), ',')
         names = _names(_cells(first[1], delimiter), form)
         numbers = {name for one in mapping.streams.values() for name in chosen(one.columns, names)}
         numbers |= {*mapping.numbers()}
-        numeric: dict[str, bool] = {}
-        # Block by block: the cells, what they are, and the rows that are malformed.
-        for block in iter(lambda: list(islice(rest, BLOCK_ROWS)), []):
-            take(len(block) * (len(names) + len(mapping.texts())))
-            rows = [_cells(line, delimiter) for _, line in block]
-            rows = [row[:-1] if len(row) == len(names) + 1 and not row[-1] else row for row in rows]
-            bad = {row: f"column 'all': {len(cells)} cells, {len(names)} are needed"
-                   for row, cells in enumerate(rows) if len(cells) != len(names)}  # fmt: skip
-            if not block[-1][1].endswith('\n'):
-                bad.setdefault(len(rows) - 1, "column 'all': the line has no end, so it may have been cut off")
-            whole = [[''] * len(names) if row in bad else cells for row, cells in enumerate(rows)]
-            part: dict[str, AnyArray] = {}
-            for name, cells in zip(names, zip(*whole, strict=True), strict=True):
-                text = name in mapping.texts()
-                if not text or name in numbers:
-                    points = [_with_point(cell) for cell in cells] if form.decimal == ',' else cells
-                    values = np.array([number_of(cell) for cell in points])
-                    text |= not numeric.setdefault(name, name in numbers or np.isfinite(values).mean() > NUMERIC)
-                for row in np.flatnonzero(np.isnan(values)).tolist() if numeric.get(name) else ():
-                    if name in numbers and cells[row].lower() not in BLANK:
-                        bad.setdefault(row, _reason(name, cells[row], form))
-                    elif WORD.search(cells[row]) and cells[row].lower() not in NO_WORD:
-                        words[cells[row]] = -1 if cells[row] in words else BLOCK_ROWS * len(parts) + row
-                if not text:
-                    _refuse_commas(name, cells, form, delimiter)
-                part[name] = _texts(cells) if text else values
-            for row in bad:
-                if {*rows[row]} & {*names}:
-                    raise InvalidData(
-                        f'row {block[row][0]}: the names of the columns come again, {", ".join(rows[row][:5])}, so '
-                        'another recording may begin there; split the file there'
-                    )
-            reasons += [f'row {block[row][0]}, {bad[row]}' for row in sorted(bad)[: EXAMPLES - len(reasons)]]
-            lines.append(np.array([number for number, _ in block]))
-            junk.append(np.isin(np.arange(len(rows)), list(bad)))
-            parts.append(part)
-    if not parts:
+        for line in rest if form.header else chain([first], rest):
+            take(len(names) + len(mapping.texts()))
+            lines.append(line)
+    if not lines:
         raise InvalidData('it has no rows below the names of its columns; choose files with samples')
-    columns = {name: np.concatenate([part[name] for part in parts]) for name in names}
-    marked, numbered = np.concatenate(junk), np.concatenate(lines)
-    above, below = _mark_ends(marked, {row: word for word, row in words.items() if row >= 0}, numbered)
-    reasons = [*above, *reasons, *below][:EXAMPLES]
-    # A malformed row without a number is none of a sample: no border is seen there.
-    floats = [column for column in columns.values() if column.dtype.kind == 'f']
-    gone = marked & np.logical_and.reduce([np.isnan(column) for column in floats])
-    last = np.maximum.accumulate(np.where(gone, np.argmin(gone), np.arange(len(gone))))
+    # The cells, and the rows that are malformed.
+    rows = [_cells(line, delimiter) for _, line in lines]
+    rows = [row[:-1] if len(row) == len(names) + 1 and not row[-1] else row for row in rows]
+    bad = {row: f"column 'all': {len(cells)} cells, {len(names)} are needed"
+           for row, cells in enumerate(rows) if len(cells) != len(names)}  # fmt: skip
+    if not lines[-1][1].endswith('\n'):
+        bad.setdefault(len(rows) - 1, "column 'all': the line has no end, so it may have been cut off")
+    whole = [[''] * len(names) if row in bad else cells for row, cells in enumerate(rows)]
+    columns: dict[str, AnyArray] = {}
+    words: dict[int, str] = {}  # in unused columns of numbers
+    for name, cells in zip(names, zip(*whole, strict=True), strict=True):
+        points = [_with_point(cell) for cell in cells] if form.decimal == ',' else cells
+        values = np.array([number_of(cell) for cell in points])
+        text = name in mapping.texts()
+        numeric = name in numbers or (not text and np.isfinite(values).mean() > NUMERIC)
+        for row in np.flatnonzero(np.isnan(values)).tolist() if numeric else ():
+            if name in numbers and cells[row].lower() not in BLANK:
+                bad.setdefault(row, _reason(name, cells[row], form))
+            elif row not in bad and WORD.search(cells[row]) and cells[row].lower() not in NO_WORD:
+                words[row] = name
+        if numeric and not text:
+            _refuse_commas(name, cells, form, delimiter)
+        columns[name] = values if numeric and not text else _texts(cells)
+    # What another recording, or a row of units or means, looks like.
+    for row in bad:
+        if {*rows[row]} & {*names}:
+            raise InvalidData(
+                f'row {lines[row][0]}: the names of the columns come again, {", ".join(rows[row][:5])}, so '
+                'another recording may begin there; split the file there'
+            )
+    if unlike := sorted(words.keys() - bad.keys()):
+        name = words[unlike[0]]
+        raise InvalidData(
+            f"row {lines[unlike[0]][0]}, column '{name}': a word in a column of numbers that no key uses: the row may "
+            f"be one of units or means; remove it, or read texts there by rows: {{{name!r}: '*'}}"
+        )
+    # A malformed row ends no slide: it has the texts of the one before.
+    marked = np.isin(np.arange(len(rows)), list(bad))
+    last = np.maximum.accumulate(np.where(marked, np.argmin(marked), np.arange(len(rows))))
     columns = {name: column[last] if column.dtype.kind == 'O' else column for name, column in columns.items()}
-    yield TableFrame(place, columns, lines=numbered, junk=marked, reasons=reasons)
-
-
-def _mark_ends(marked: AnyArray, words: Mapping[int, str], lines: AnyArray) -> list[list[str]]:
-    """Mark the rows with a word that are above all others or below them, and return the reasons of each."""
-    reasons = []
-    for order in (range(len(marked)), range(len(marked) - 1, -1, -1)):
-        ends = [row for row in takewhile(lambda row: marked[row] or row in words, order) if not marked[row]]
-        marked[ends] = True
-        reasons.append([f"row {lines[row]}, '{words[row][:40]}' is no number" for row in sorted(ends)])
-    return reasons
+    reasons = [f'row {lines[row][0]}, {bad[row]}' for row in sorted(bad)[:EXAMPLES]]
+    yield TableFrame(place, columns, lines=np.array([number for number, _ in lines]), junk=marked, reasons=reasons)
 
 
 def _names(cells: Sequence[str], form: FileFormat) -> list[str]:
@@ -378,8 +362,6 @@ def _read_hdf5(
 
         def note(name: str, member: Any) -> None:
             """Keep a data set; the elements of references, as of cells and arrays of structs of MATLAB, from 1 on."""
-            if len(found) > MAX_ARRAYS or name.count('/') > 20:
-                raise InvalidData(f'it has more than {MAX_ARRAYS} data sets, or circles of them; split it')
             if isinstance(member, h5py.Group):
                 for part, inner in member.items():
                     note(f'{name}/{part}', inner)
@@ -573,12 +555,11 @@ def _joined(name: str, part: str) -> str:
 # ---- bags of messages: each number of a message is a column, such as '/wrench/wrench.force.x'
 
 MAX_FIELDS = 2000  # of one message
-AXES = ('samples', 'channels')
 OTHER_CLOCK_NS = NANOSECONDS  # stamps that differ more from the time of logging are of another clock
 
 
-def _values(value: Any, path: str, found: dict[str, AnyArray]) -> None:
-    """Add every number and text of a message by its path, such as 'wrench.force.x' or 'data.3', (1,) each."""
+def _values(value: Any, path: str, found: dict[str, Any]) -> None:
+    """Add every number and text of a message by its path, such as 'wrench.force.x' or 'data.3'."""
     if dataclasses.is_dataclass(value):
         for part in dataclasses.fields(value):
             if part.name not in ('stamp', '__msgtype__'):
@@ -587,31 +568,21 @@ def _values(value: Any, path: str, found: dict[str, AnyArray]) -> None:
         for number, one in enumerate(value[: MAX_FIELDS + 1]):
             _values(one, f'{path}.{number}', found)
     else:
-        found[path] = np.array([value], dtype=object if isinstance(value, str) else None)
+        found[path] = value
     if len(found) > MAX_FIELDS:
         raise InvalidData(f'it has more than {MAX_FIELDS} numbers')
 
 
-def _rows_of(value: Any, msgtype: str) -> dict[str, AnyArray]:
-    """Return the values of a message by name, (n,) each; of an array of two dimensions, n consecutive samples."""
-    found: dict[str, AnyArray] = {}
+def _fields_of(value: Any, msgtype: str) -> dict[str, Any]:
+    """Return the numbers and texts of a message by name."""
+    found: dict[str, Any] = {}
     if msgtype == 'sensor_msgs/msg/JointState':  # whose order may differ from bag to bag
         for kind in ('position', 'velocity', 'effort'):
             numbers = zip(value.name, getattr(value, kind), strict=False)
-            found |= {f'{kind}.{joint}': np.array([number]) for joint, number in numbers}
-        return found
-    if msgtype not in ('std_msgs/msg/Float32MultiArray', 'std_msgs/msg/Float64MultiArray') or not value.layout.dim[1:]:
+            found |= {f'{kind}.{joint}': number for joint, number in numbers}
+    else:
         _values(value, '', found)
-        return found
-    labels = tuple(axis.label.strip().lower() for axis in value.layout.dim)
-    if labels not in (AXES, AXES[::-1]):
-        raise InvalidData(
-            f'its dimensions are named {", ".join(map(repr, labels))}, which does not tell samples from channels; '
-            "republish it with the labels 'samples' and 'channels'"
-        )
-    table = value.data[value.layout.data_offset :].reshape([axis.size for axis in value.layout.dim])
-    table = table if labels == AXES else table.T
-    return {f'data.{number}': table[:, number] for number in range(min(table.shape[1], MAX_FIELDS))}
+    return found
 
 
 def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:
@@ -627,7 +598,7 @@ def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
     names: dict[str, Any] = {}
     seen: dict[str, Any] = {}
     types: dict[str, Any] = {}
-    rows: dict[str, list[dict[str, AnyArray]]] = {}
+    rows: dict[str, list[dict[str, Any]]] = {}
     stamps: dict[str, list[tuple[int, int]]] = {}  # by the device and the recorder, ns
 
     def is_wanted(connection: Any) -> bool:
@@ -641,7 +612,7 @@ def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
         before = rows.setdefault(name, [])
         try:
             value = types[name].deserialize_cdr(message.data, message.msgtype)
-            found = _rows_of(value, message.msgtype)
+            found = _fields_of(value, message.msgtype)
         except Exception as error:
             raise InvalidData(f"message {len(before)} of '{name}' cannot be read: {error}; record it again") from error
         fields = names.setdefault(name, found.keys())
@@ -650,9 +621,13 @@ def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
             raise InvalidData(f"message {len(before)} of '{name}' has other fields than the first: {other}")
         if name not in kept:  # what the mapping names, and what may be codes
             of = {part for part in found if _is_meant(f'{name}/{part}', meant)}
-            kept[name] = of | {part for part, one in found.items() if one.dtype.kind != 'f'} if of else {*found}
+            kept[name] = (
+                of | {part for part, one in found.items() if not isinstance(one, (float, np.floating))}
+                if of
+                else {*found}
+            )
         found = {part: one for part, one in found.items() if part in kept[name]}
-        take(10 * len(found) + sum(map(len, found.values())))  # small arrays take more than their values
+        take(2 * len(found))  # they take more than their values
         before.append(found)
         stamp = getattr(getattr(value, 'header', None), 'stamp', None)
         stamp_ns = stamp.sec * NANOSECONDS + stamp.nanosec if stamp else 0
@@ -667,15 +642,11 @@ def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
     columns: dict[str, AnyArray] = {}
     clocks: dict[str, str] = {}
     for name, parts in rows.items():
-        # The samples of one message lie evenly between it and the next.
-        times_s = (times_ns[name] - begin_ns) / NANOSECONDS
-        counts = np.array([max(map(len, part.values()), default=0) for part in parts])
-        steps_s = np.diff(times_s, append=times_s[-1] + (np.median(np.diff(times_s)) if len(times_s) > 1 else 0.0))
-        within = np.concatenate([np.arange(count) / max(count, 1) for count in counts])
         clock = f'{name}/time'
-        columns[clock] = np.repeat(times_s, counts) + np.repeat(steps_s, counts) * within
-        for part in parts[0]:
-            columns[f'{name}/{part}'] = np.concatenate([one[part] for one in parts])
+        columns[clock] = (times_ns[name] - begin_ns) / NANOSECONDS
+        for part, first in parts[0].items():
+            values = [one[part] for one in parts]
+            columns[f'{name}/{part}'] = np.array(values, dtype=object if isinstance(first, str) else None)
             clocks[f'{name}/{part}'] = clock
     yield TableFrame(place, columns, clocks=clocks)
 

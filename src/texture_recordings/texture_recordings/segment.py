@@ -12,9 +12,9 @@ from texture_core.cli import progress
 from texture_core.errors import InvalidData
 from texture_core.types import ExplorationState, Phase, TactileSignal
 from texture_features.segmentation import SegmentationParams, segment_recording
-from texture_recordings.bags import BagWriter, RawMessage, find_bags, read_bag, read_named
+from texture_recordings.bags import EXPLORATION, BagWriter, find_bags, read_bag, read_named
 
-FAST_TOPIC, STATE_TOPIC = 'signal', 'exploration'
+FAST_TOPIC = 'signal'
 
 
 def segment_bags(
@@ -39,13 +39,21 @@ def segment_bags(
 def _segment(path: Path, out: Path, params: SegmentationParams, surface: str, namespace: str | None) -> int:
     signals: list[TactileSignal] = []
     reported: list[ExplorationState] = []
-    for topic, _, value in read_bag(path, (FAST_TOPIC, STATE_TOPIC), namespace):
-        (reported if topic == STATE_TOPIC else signals).append(value)
+    for topic, _, value in read_bag(path, (FAST_TOPIC, EXPLORATION), namespace):
+        (reported if topic == EXPLORATION else signals).append(value)
     if not signals:
         raise InvalidData(f"the bag '{path}' has no '{FAST_TOPIC}' to find slides in; also record the vibration")
     found = segment_recording(signals, params, exploration_id=path.name)
     states = _labelled(found, sorted(reported, key=lambda state: state.stamp_ns), surface)
-    _write(path, out, states, namespace)
+    with BagWriter(out) as bag:
+        prefix = ''
+        for name, message in read_named(path, namespace):
+            if name != EXPLORATION:
+                bag.write_raw(message)
+            if message.topic != '/diagnostics':
+                prefix = message.topic.removesuffix(f'/{name}')
+        for state in states:
+            bag.write(f'{prefix}/{EXPLORATION}', state, state.stamp_ns)
     return sum(state.phase is Phase.SLIDE for state in states)
 
 
@@ -69,27 +77,3 @@ def _labelled(
             )
         )
     return states
-
-
-def _write(path: Path, out: Path, states: Sequence[ExplorationState], namespace: str | None) -> None:
-    """Copy a bag, with other states: each is logged before the samples that it covers, as by an explorer."""
-    waiting = list(states)
-    with BagWriter(out) as bag:
-        prefix = ''
-        for name, message in read_named(path, namespace):
-            prefix = prefix or _prefix(name, message)
-            while waiting and waiting[0].stamp_ns <= message.log_ns:
-                _put(bag, waiting.pop(0), prefix)
-            if name != STATE_TOPIC:
-                bag.write_raw(message)
-        for state in waiting:
-            _put(bag, state, prefix)
-
-
-def _put(bag: BagWriter, state: ExplorationState, prefix: str) -> None:
-    bag.write(f'{prefix}/{STATE_TOPIC}', state, state.stamp_ns)
-
-
-def _prefix(name: str, message: RawMessage) -> str:
-    """Return the namespace of a message of the finger, '' for the root."""
-    return '' if message.topic == '/diagnostics' else message.topic.removesuffix(f'/{name}')

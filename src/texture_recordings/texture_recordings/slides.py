@@ -32,7 +32,7 @@ from texture_core.types import (
     TactileSignal,
     join_batches,
 )
-from texture_recordings.bags import find_bags, read_bag
+from texture_recordings.bags import EXPLORATION, find_bags, read_bag
 
 # --------------------
 # One labelled slide in a bag.
@@ -145,8 +145,6 @@ class SlideSamples:
     ----------
     slide
         Its bag, surface and number.
-    before : (m, n_channels)
-        Samples before the slide began, in contact; often none.
     samples : (n, n_channels)
         Samples of the covered time, evenly spaced.
     rate_hz, channels
@@ -164,7 +162,6 @@ class SlideSamples:
     """
 
     slide: LabelledSlide
-    before: Array
     samples: Array
     rate_hz: float
     channels: tuple[str, ...]
@@ -196,7 +193,7 @@ class SlideSamples:
         samples = np.concatenate([batch.samples for batch in batches]).astype(np.float64)
         first, last = (round((at - batches[0].stamp_ns) * rate_hz / NANOSECONDS) for at in covered(states))
         return cls(
-            slide, samples[: max(first, 0)], samples[max(first, 0) : last], rate_hz, batches[0].channels,
+            slide, samples[max(first, 0) : last], rate_hz, batches[0].channels,
             slide.speed_m_s, slide.force_n, slide.direction_rad,
         )  # fmt: skip
 
@@ -211,7 +208,7 @@ def covered(states: Sequence[ExplorationState]) -> tuple[int, int]:
 
 RANGE = re.compile(r'(\d+)(?:-(\d+))?')
 Message = tuple[str, int, Any]
-STREAMS, STATES = ('signal', 'signal_static'), 'exploration'
+STREAMS = ('signal', 'signal_static')
 
 
 def parse_selection(text: str) -> frozenset[int] | None:
@@ -257,8 +254,8 @@ def find_slides(
 
 def _slides_of(path: Path, namespace: str | None, topics: Sequence[str]) -> list[LabelledSlide]:
     """Return the labelled slides of one bag, yet without numbers: an exploration lasts until the next one begins."""
-    messages = list(read_bag(path, (*topics, STATES), namespace))
-    reported = [message for message in messages if message[0] == STATES and message[2].exploration_id]
+    messages = list(read_bag(path, (*topics, EXPLORATION), namespace))
+    reported = [message for message in messages if message[0] == EXPLORATION and message[2].exploration_id]
     groups = [list(group) for _, group in groupby(reported, key=lambda message: message[2].exploration_id)]
     starts: list[int | None] = [group[0][1] for group in groups]
     return [
@@ -282,7 +279,7 @@ def _slide(
     streams: defaultdict[str, list[Any]] = defaultdict(list)
     for topic, _, value in messages[first:last]:
         streams[topic].append(value)
-    heard = streams.pop(STATES)
+    heard = streams.pop(EXPLORATION)
     began = [now.stamp_ns for was, now in pairwise([None, *heard]) if _begins(was, now)]
     # A hundred small batches a second take ten times the memory of their samples, and most of the time of the cutter.
     signals = {topic: join_batches(batches, began) for topic, batches in streams.items()}

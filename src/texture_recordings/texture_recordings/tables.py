@@ -7,11 +7,9 @@ from __future__ import annotations
 import fnmatch
 import math
 import re
-import shutil
 import unicodedata
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
@@ -22,8 +20,8 @@ import numpy as np
 from texture_core.cli import progress
 from texture_core.config import parse_yaml
 from texture_core.errors import InvalidData
-from texture_core.types import NANOSECONDS, AnyArray, Array, ExplorationState, Phase, TactileSignal, checked_label
-from texture_recordings.bags import DELAY_NS, PAUSE_NS, START_NS, BagWriter, is_bag, is_cut_off, slide_batches
+from texture_core.types import AnyArray, Array, ExplorationState, Phase, TactileSignal, checked_label
+from texture_recordings.bags import SlideBags, SlideStreams, is_bag, is_cut_off
 from texture_recordings.clock import (
     MAX_LEFT_OUT,
     SAME_RATE,
@@ -56,21 +54,17 @@ from texture_recordings.readers import (
     number_of,
     placed,
 )
-from texture_recordings.slides import STATES
 
 PLAUSIBLE_HZ, LIKELY_HZ = (5.0, 200_000.0), (20.0, 20_000.0)
 LONGEST_SLIDE_S = 1800.0
-STATE_S = 0.1  # a state so often where a condition changes along a slide
 SAME_TIME_S = 1e-9
 MAX_NUMBERED = 3  # columns name_1 … name_n beyond this may be samples: the mapping has to tell
 ROWS_A_CODE = 2  # at least, of a column that may name sensors, trials or runs
-CLOCK_TEXT = re.compile(r'[-\d/.T ]*\d{1,2}:\d\d[-+:.,\d ZAPM]*')  # of the day: it changes as time does
 MANY_TEXTS = 50  # different ones are no codes
-FLAGS = [{one, other} for one, other in (('true', 'false'), ('yes', 'no'), ('on', 'off'))]
+FLAGS = {'true', 'false', 'yes', 'no', 'on', 'off'}
 CODE_NAME = re.compile(
     r'(?:sensor|finger|trial|run|rep|repeat|repetition|recording|session|pass|stroke)s?[ _-]?(?:id|no|nr|number)?'
 )
-MAX_NAMED = 20  # sensors, trials or runs, of a column that is named so: more are its samples
 MAX_TURNS, IN_TURN = 100, 0.7  # sensors in turn, and share of rows with the number of as many rows before
 # Lowest and highest mean of a slide that a tactile finger reaches, in SI units.
 PLAUSIBLE: Mapping[str, tuple[float, float]] = {
@@ -156,7 +150,7 @@ def import_tables(
     left out, or a bag exists already.
     """
     report = ImportReport()
-    with SlideBags(mapping, out) as bags:
+    with SlideBags(out) as bags:
         for path, place, fields in progress(_files(mapping, Path(source), kinds, report), 'import files'):
             for frame in frames(path, place, mapping):
                 with placed(frame.place):
@@ -240,10 +234,6 @@ class Stream:
     burst_s: float = 0.0
 
 
-# By topic: a stream, and of one slide its samples and their places on the grid.
-SlideStreams = Mapping[str, tuple[Stream, AnyArray, AnyArray]]
-
-
 class FrameSlides:
     """The slides of one frame."""
 
@@ -302,19 +292,13 @@ class FrameSlides:
             if not mask.any():
                 has = ', '.join(sorted({*texts.tolist()})[:5])
                 raise InvalidData(f"column '{name}' has no row '{value}'; it has {has}")
-            timed = all(one.time.column for one in self._mapping.streams.values())
-            junk = np.zeros(len(mask), dtype=bool) if frame.junk is None or timed else frame.junk
-            lines = np.arange(len(mask)) if frame.lines is None else frame.lines
-            good = np.flatnonzero(~junk)
-            between = np.flatnonzero(np.diff(good) > 1)
-            if len(between):
-                row = f'row {lines[good[between[0]] + 1]}'
-                reason = next((one for one in frame.reasons if one.startswith(f'{row},')), f'{row} is malformed')
+            if any(not one.time.column for one in self._mapping.streams.values()) and frame.reasons:
                 raise InvalidData(
-                    f'{reason}: of a malformed row nobody knows whether it is one of those under `rows`, so without a '
-                    'column of time the rows behind it may shift; give one, or remove the row'
+                    f'{frame.reasons[0]}: of a malformed row nobody knows whether it is one of those under `rows`, so '
+                    'without a column of time the rows behind it may shift; give one, or remove the row'
                 )
             self._report.leave_out('rows are not those under `rows`', int((~mask).sum()))
+            lines = np.arange(len(mask)) if frame.lines is None else frame.lines
             frame = replace(
                 frame, lines=lines[mask], junk=None if frame.junk is None else frame.junk[mask],
                 columns={key: one[mask] if one.shape == mask.shape else one for key, one in frame.columns.items()},
@@ -455,8 +439,8 @@ class FrameSlides:
             plain = array.ndim and array.dtype.kind in 'OUSbiuf'
             if name in used or not plain or self._group(name) != self._reference.group:
                 continue
-            values = self._codes(name)
-            for span in self._spans if len(values) else ():
+            values = self._frame.texts(name) if array.dtype.kind in 'OUSb' else self._frame.numbers(name)
+            for span in self._spans:
                 rows = self._reference.rows[span]
                 rows = rows[values[rows] != ''] if values.dtype.kind == 'O' else rows[np.isfinite(values[rows])]
                 if name not in found and (row := _mixed(values[rows], named=_is_code(name))):
@@ -472,29 +456,6 @@ class FrameSlides:
                 f'there by slides: {{by: column, column: {key}}}, or take all as one signal by rows: '
                 f'{{{all_of}}}'
             )  # fmt: skip
-
-    def _codes(self, name: str) -> AnyArray:
-        """Return what may be codes of sensors, trials or runs, (n,) texts or numbers; nothing of other columns."""
-        array, named, times = self._frame[name], _is_code(name), self._reference.time_s
-        nothing = np.empty(0)
-        values = self._frame.texts(name) if array.dtype.kind in 'OUSb' else self._frame.numbers(name)
-        if values.dtype.kind == 'O':
-            texts, counts = np.unique(values[values != ''], return_counts=True)
-            numbers = np.array([number_of(one) for one in texts.tolist()])
-            flag = len(texts) <= 2 and {one.lower() for one in texts.tolist()} in FLAGS
-            few = 0 < len(texts) <= counts.sum() / ROWS_A_CODE
-            if not few or CLOCK_TEXT.fullmatch(texts[0]) or (not named and (flag or len(texts) > MANY_TEXTS)):
-                return nothing
-            if np.isnan(numbers).sum() > 1 or np.isnan(numbers).all():
-                return values
-            values = self._frame.numbers(name)  # next to '-' or the like where there is none
-        known = values[np.isfinite(values)]
-        if not 2 <= len(np.unique(known)) <= len(values) / ROWS_A_CODE or (known % 1.0).any():
-            return nothing
-        if times is not None and not named and len(np.unique(known)) > 2:
-            ahead = values[self._reference.rows] - times  # seconds without their parts
-            return nothing if np.nanmax(ahead) - np.nanmin(ahead) <= 1.0 + SAME_TIME_S else values
-        return values
 
     def _rated(self, stream: Stream) -> Stream:
         """Return a stream with the rate of its rows: as stated, else by its times, which must agree."""
@@ -584,14 +545,16 @@ class FrameSlides:
             )
         streams = {one.name: self._samples(one, surface, self._frame_rows(rows), begin_s, end_s)
                    for one in self._streams}  # fmt: skip
-        named = ExplorationState(0, f'{self._place}/{number}', self._mapping.motion, Phase.SLIDE, surface=surface)
-        states = self._states(named, times, rows, end_s - begin_s)
+        known: dict[str, Any] = {}
         for name, column in CONDITION_COLUMNS.items():
-            known = [getattr(state, column) for state in states if math.isfinite(getattr(state, column))]
-            if known:
-                self._report.conditions[surface, name].append(self._plausible(name, float(np.mean(known))))
+            mean = self._condition(name, rows)
+            if math.isfinite(mean):
+                self._report.conditions[surface, name].append(self._plausible(name, mean))
+                known[column] = mean
         self._report.slides[surface] += 1
-        return session, states, streams
+        name, motion = f'{self._place}/{number}', self._mapping.motion
+        state = ExplorationState(0, name, motion, Phase.SLIDE, surface=surface, **known)
+        return session, [state], streams
 
     def _named(self, code: str) -> str:
         """Return the name of a label, by number where codes are numbers: 1 names '1.0' and '01', too."""
@@ -607,7 +570,7 @@ class FrameSlides:
 
     def _samples(
         self, stream: Stream, surface: str, frame_rows: tuple[int, int], begin_s: float, end_s: float
-    ) -> tuple[Stream, AnyArray, AnyArray]:
+    ) -> tuple[TactileSignal, AnyArray]:
         """Return the samples of a slide, and their places on the grid."""
         at = stream.rows / stream.rate_hz if stream.time_s is None else stream.time_s
         if stream.group == self._reference.group:
@@ -635,7 +598,9 @@ class FrameSlides:
         # Successive columns that are consecutive samples of one channel.
         count = stream.per_row
         flat = samples[rows].reshape(len(rows), -1, count).transpose(0, 2, 1).reshape(len(rows) * count, -1)
-        return stream, flat, np.add.outer(index * count, np.arange(count)).ravel()
+        units, sensor = (stream.params.unit,) * len(stream.channels), self._mapping.sensor
+        signal = TactileSignal(0, sensor, stream.channels, units, stream.rate_hz * count, 0, flat, sensor)
+        return signal, np.add.outer(index * count, np.arange(count)).ravel()
 
     # ---- conditions
 
@@ -654,35 +619,22 @@ class FrameSlides:
             + (f', which may be {" or ".join(likely)}' if likely else '')
         )
 
-    def _states(self, named: ExplorationState, times: Array, rows: slice, slide_s: float) -> list[ExplorationState]:
-        """Return what holds from 0 on, and every 0.1 s after if a condition changes along the slide."""
-        begin_s = float(times[rows].min())
-        tracks = {column: self._track(name, times, rows) for name, column in CONDITION_COLUMNS.items()}
-        changing = any(len(values) > 1 and np.ptp(values) > 0 for _, values in tracks.values())
-        count = max(1, round(slide_s / STATE_S)) if changing else 1
-        states = []
-        for start_s, stop_s in pairwise([*(begin_s + STATE_S * np.arange(count)), math.inf]):
-            means: dict[str, Any] = {column: _mean(*track, start_s, stop_s) for column, track in tracks.items()}
-            states.append(replace(named, stamp_ns=round((start_s - begin_s) * NANOSECONDS), **means))
-        return states
-
-    def _track(self, name: str, times: Array, rows: slice) -> tuple[Array, Array]:
-        """Return times and known values of a condition in SI units, (n,) each; a force and a speed without sign."""
+    def _condition(self, name: str, rows: slice) -> float:
+        """Return the mean of a condition over a slide in SI units, NaN if unknown; a force and a speed without sign."""
         quantity = self._mapping.conditions.get(name, Quantity())
         if quantity.column and self._frame[quantity.column].ndim:
-            times, values = times[rows], self._aligned(self._numbers, quantity.column, rows)
+            values = self._aligned(self._numbers, quantity.column, rows)
         else:
             text = str(self._frame[quantity.column]) if quantity.column else quantity.value or 'nan'
-            times, values = times[rows][:1], np.array([number_of(text)])
+            values = np.array([number_of(text)])
             if np.isnan(values[0]) and text != 'nan':
                 raise InvalidData(f"'{quantity.column}' is '{text}' in its name; a number is needed there")
-        times, values = times[np.isfinite(values)], values[np.isfinite(values)]
-        values = values * CONDITION_UNITS[name].get(quantity.unit, 1.0)
+        values = values[np.isfinite(values)] * CONDITION_UNITS[name].get(quantity.unit, 1.0)
         if name == 'direction' and len(values):  # 359° next to 1° is 361°
             values -= math.tau * np.round((values - values[0]) / math.tau)
         values = np.abs(values) if name == 'speed' else values
-        negative = name == 'force' and len(values) and values.mean() < 0
-        return times, -values if negative else values
+        mean = float(values.mean()) if len(values) else math.nan
+        return abs(mean) if name == 'force' else mean
 
 
 def _is_one_of(text: str, wanted: Sequence[str]) -> bool:
@@ -700,102 +652,17 @@ def _key(name: str) -> str:
 
 
 def _mixed(values: AnyArray, *, named: bool) -> int:
-    """Return the first row at which texts change, or numbers in turn or in blocks; 0 if none does.
+    """Return the first row at which few texts of a slide change, or whole numbers in turn or in blocks; 0 if none does.
 
-    In a column that is named as one of codes flags may be in blocks, too, and few others in any order.
+    Flags in blocks are no codes, unless the column is named as one of codes, whose every change counts.
     """
     found, codes = np.unique(values, return_inverse=True)
     changes, count = np.flatnonzero(codes[1:] != codes[:-1]) + 1, len(found)
-    if values.dtype.kind != 'O' and len(codes) < ROWS_A_CODE * count:  # a number of rows
-        return 0
-    flags = values.dtype.kind != 'O' and not named and {*found.tolist()} <= {0.0, 1.0}
-    in_blocks = values.dtype.kind == 'O' or (len(changes) == count - 1 and (named or not flags))
-    in_blocks |= named and not flags and count <= MAX_NAMED
-    in_turn = (
-        count <= MAX_TURNS and len(changes) > 0.5 * len(codes) and (codes[count:] == codes[:-count]).mean() > IN_TURN
-    )
-    return int(changes[0]) if len(changes) and (in_blocks or in_turn) else 0
-
-
-def _mean(times: Array, values: Array, begin_s: float, end_s: float) -> float:
-    """Return the mean of values between two times; the last one before where there is none."""
-    if len(values) <= 1:
-        return float(values[0]) if len(values) else math.nan
-    inside = values[(times >= begin_s) & (times < end_s)]
-    return float(inside.mean()) if len(inside) else float(values[max(0, int(np.searchsorted(times, begin_s)) - 1)])
-
-
-# --------------------
-# Bags of the slides.
-
-MAX_BAGS = 500
-
-
-class SlideBags:
-    """Bags below a folder, written slide by slide; use it in a `with` block, where an error removes them again.
-
-    Stamps are made up: each slide begins a second after the one before, in whatever bag that is, so slides keep their
-    order over all bags.
-    """
-
-    def __init__(self, mapping: TableMapping, out: str | Path | None) -> None:
-        self._mapping, self._out = mapping, None if out is None else Path(out)
-        self._open = ExitStack()
-        self._bags: dict[str, BagWriter] = {}
-        self._next: dict[tuple[str, str], int] = {}
-        self._now_ns = START_NS
-
-    @property
-    def paths(self) -> list[Path]:
-        """Paths of the bags in the order in which they were begun."""
-        return [bag.path for bag in self._bags.values()]
-
-    def write(self, session: str, states: Sequence[ExplorationState], streams: SlideStreams) -> None:
-        """Write a slide, whose stamps count from 0, into the bag of a session."""
-        bag = self._bag(session)
-        if bag is None:
-            return
-        messages: list[tuple[int, str, Any]] = []
-        end_ns = 1
-        for topic, (stream, samples, index) in streams.items():
-            units, rate_hz = (stream.params.unit,) * len(stream.channels), stream.rate_hz * stream.per_row
-            like = TactileSignal(
-                0, self._mapping.sensor, stream.channels, units, rate_hz, self._next.get((session, topic), 0),
-                np.empty((0, len(units)), dtype=np.float32), self._mapping.sensor,
-            )  # fmt: skip
-            for batch in slide_batches(like, samples, index, self._now_ns):
-                messages.append((batch.end_ns + DELAY_NS, topic, batch))
-                self._next[session, topic] = batch.next_sample
-            end_ns = max(end_ns, round(float(index[-1] + 1) / rate_hz * NANOSECONDS))
-        for state, until_ns in zip(states, [*(state.stamp_ns for state in states[1:]), end_ns], strict=True):
-            at_ns, steady_s = self._now_ns + state.stamp_ns, max(0, until_ns - state.stamp_ns) / NANOSECONDS
-            progress = state.stamp_ns / end_ns
-            messages.append((at_ns, STATES, replace(state, stamp_ns=at_ns, steady_s=steady_s, progress=progress)))
-        over = replace(states[-1], stamp_ns=self._now_ns + end_ns, progress=1.0)
-        for count, phase in enumerate((Phase.LIFT, Phase.DONE), 3):
-            messages.append((over.stamp_ns + count * DELAY_NS, STATES, replace(over, phase=phase)))
-        bag.write_all(messages)
-        self._now_ns = max(log_ns for log_ns, _, _ in messages) + PAUSE_NS
-
-    def _bag(self, session: str) -> BagWriter | None:
-        if session not in self._bags:
-            name = checked_label(session)
-            if not name or name.startswith('.') or len(self._bags) >= MAX_BAGS:
-                raise InvalidData(
-                    f"no bag can be named '{name}' as the {len(self._bags) + 1}th; at most {MAX_BAGS} bags with plain "
-                    'names are made, choose another `session`'
-                )
-            if self._out is None:
-                return None
-            self._out.mkdir(parents=True, exist_ok=True)
-            self._bags[session] = self._open.enter_context(BagWriter(self._out / name))
-        return self._bags[session]
-
-    def __enter__(self) -> SlideBags:
-        return self
-
-    def __exit__(self, *error: Any) -> None:
-        self._open.__exit__(*error)
-        if error[0]:
-            for path in self.paths:
-                shutil.rmtree(path, ignore_errors=True)
+    mixed = 2 <= count <= len(values) / ROWS_A_CODE
+    if values.dtype.kind == 'O':
+        mixed &= named or (count <= MANY_TEXTS and not {text.lower() for text in found.tolist()} <= FLAGS)
+    elif not named and mixed:
+        in_blocks = len(changes) == count - 1 and not {*found.tolist()} <= {0.0, 1.0}
+        in_turn = len(changes) > 0.5 * len(codes) and (codes[count:] == codes[:-count]).mean() > IN_TURN
+        mixed = not (found % 1.0).any() and (in_blocks or (count <= MAX_TURNS and bool(in_turn)))
+    return int(changes[0]) if mixed else 0

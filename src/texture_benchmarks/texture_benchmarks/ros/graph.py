@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +51,9 @@ def measure(model_path: Path, scene: str, surface: str, slide_s: float, *, seed:
     batches: dict[str, list[TactileSignal]] = {}
     for topic, [first, *others] in signals.items():  # one unbroken stream
         samples = np.concatenate([first.samples, *(signal.samples for signal in others)])
-        batches[topic] = list(slide_batches(first, samples, np.arange(len(samples)), first.stamp_ns, batch_s=BATCH_S))
+        batches[topic] = list(
+            slide_batches(replace(first, samples=samples), np.arange(len(samples)), first.stamp_ns, batch_s=BATCH_S)
+        )
     plan: list[tuple[int, str, Any]] = [(state.stamp_ns, 'exploration', state) for state in states]
     plan += [(batch.end_ns, topic, batch) for topic, of_topic in batches.items() for batch in of_topic]
     plan.sort(key=lambda timed: timed[0])
