@@ -3,9 +3,12 @@
 """Build this package. The same text in every Python package of the suite: all facts come from package.xml."""
 
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 from setuptools import find_packages, setup
+from setuptools.command.develop import develop
+from setuptools.command.install_scripts import install_scripts
 
 HERE = Path(__file__).parent
 PACKAGE = ElementTree.parse(HERE / 'package.xml').getroot()
@@ -32,6 +35,16 @@ def executables() -> list[str]:
     """Return one executable for each module of nodes/, named as the module, and the one of command.py."""
     command = [f'texture = {NAME}.command:program'] if (HERE / NAME / 'command.py').exists() else []
     return [f'{module} = texture_core.start:node' for module in modules('nodes')] + command
+
+
+def holding(command: type) -> type:
+    """Return a command of setuptools that writes executables whose stop signals wait until Python can handle them."""
+
+    class Holding(command):
+        def write_script(self, name: str, contents: str, *more: Any) -> None:
+            super().write_script(name, contents.replace('#!', '#!/usr/bin/env -S --block-signal=INT,TERM ', 1), *more)
+
+    return Holding
 
 
 def commands() -> list[str]:
@@ -76,5 +89,6 @@ setup(
     extras_require=extras(),
     zip_safe=False,
     entry_points={'console_scripts': executables(), 'texture.commands': commands()},
+    cmdclass={'develop': holding(develop), 'install_scripts': holding(install_scripts)},
     options={'develop': {'script_dir': f'$base/lib/{NAME}'}, 'install': {'install_scripts': f'$base/lib/{NAME}'}},
 )

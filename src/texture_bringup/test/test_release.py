@@ -11,6 +11,7 @@ import pytest
 import yaml
 
 from texture_bringup.launcher import STOP, find_launch_file
+from texture_core.config import executable
 
 ROOT = Path(__file__).resolve().parents[3]
 PACKAGES = sorted(manifest.parent for manifest in ROOT.glob('src/*/package.xml'))
@@ -42,6 +43,11 @@ def test_what_ubuntu_lacks_is_locked_with_the_versions_and_markers_that_are_test
     for name in re.search(r'^names=\((.+)\)$', (ROOT / 'docker' / 'lock.sh').read_text(), re.M)[1].split():
         assert extra[name] == tested[name]
     assert 'python_full_version' in extra['ur-rtde'][1]  # no wheel from Python 3.13 on
+
+
+@pytest.mark.parametrize(('package', 'name'), [('texture_exploration', 'explorer'), ('texture_bringup', 'texture')])
+def test_a_stop_signal_waits_until_python_can_handle_it(package: str, name: str) -> None:
+    assert executable(package, name).read_text().startswith('#!/usr/bin/env -S --block-signal=INT,TERM ')
 
 
 def test_a_container_is_stopped_by_the_signal_on_which_launch_ends_its_nodes() -> None:

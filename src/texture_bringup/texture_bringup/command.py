@@ -81,6 +81,8 @@ def program() -> int:
 
 
 def _dispatch(given: Sequence[str]) -> int:
+    # They have waited while Python started, see setup.py.
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGINT, signal.SIGTERM))
     if not given or given[0] in ('-h', '--help', 'help'):
         print(overview())
         return 0

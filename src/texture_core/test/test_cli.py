@@ -7,6 +7,8 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
+
 from texture_core import cli
 from texture_core.errors import InvalidData
 
@@ -29,16 +31,17 @@ def test_a_sentence_on_a_file_has_no_number_of_the_operating_system() -> None:
     assert sentence == "'x' cannot be read: No such file or directory; give another"
 
 
-def test_ctrl_c_while_a_node_imports_ends_it_with_0_and_without_a_traceback(tmp_path: Path) -> None:
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_stop_while_a_node_imports_ends_it_with_0_and_without_a_traceback(number, tmp_path: Path) -> None:
     nodes, executable = tmp_path / 'slow' / 'nodes', tmp_path / 'lib' / 'slow' / 'one'
     for folder in (nodes, executable.parent):
         folder.mkdir(parents=True)
     (nodes / 'one.py').write_text("import time\nprint('imports', flush=True)\ntime.sleep(60)")
     executable.write_text('from texture_core.start import node\nnode()')
     environment = {**os.environ, 'PYTHONPATH': f'{tmp_path}:{os.environ.get("PYTHONPATH", "")}'}
-    command = [sys.executable, str(executable)]
+    command = ['env', '--block-signal=INT,TERM', sys.executable, str(executable)]
     process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout.readline() == 'imports\n'
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     assert process.communicate(timeout=30.0) == ('', '')
     assert process.returncode == 0
