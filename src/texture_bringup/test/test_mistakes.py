@@ -115,6 +115,7 @@ def test_the_models_are_good_and_the_figures_are_written(data, capsys, tmp_path)
         ('identify fast', 'has no motions to choose from'),
         ('launch emulatr', "no launch file 'emulatr'; did you mean 'emulator'?"),
         ('launch emulator surfcae:=glass', "did you mean 'surface'?"),
+        ('launch emulator max_force_n:=5', 'Parameters of the explorer are in the file of explorer_params:=FILE'),
         ('launch emulator surface', 'write NAME:=VALUE'),
         ('launch ros_controllers preset:=moveit_serv', "did you mean 'moveit_servo'?"),
         ('launch emulator surface:=glas', "no surface 'glas'; did you mean 'glass'?"),

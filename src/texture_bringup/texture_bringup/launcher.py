@@ -37,7 +37,7 @@ from texture_core.config import (
     read_bounded,
     unknown_name,
 )
-from texture_core.errors import InvalidLaunch, LaunchFailed, TextureError
+from texture_core.errors import InvalidLaunch, LaunchFailed, TextureError, UnknownName
 
 # --------------------
 # A sub-command as a child process of another program, which watches and ends it.
@@ -502,7 +502,9 @@ def read(path: Path, given: Mapping[str, str], environment: Mapping[str, str]) -
     reader.read_file(path)
     for name in given:
         if name not in reader.declared:
-            raise unknown_name(name, reader.declared, f'argument of {path.name}')
+            error = unknown_name(name, reader.declared, f'argument of {path.name}')
+            explorer = '. Parameters of the explorer are in the file of explorer_params:=FILE'
+            raise UnknownName(f'{error}{explorer * ("explorer_params" in reader.declared)}')
     return reader.nodes
 
 
