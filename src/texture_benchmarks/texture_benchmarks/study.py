@@ -115,8 +115,8 @@ def resumed(work: Callable[[Job], Out], jobs: Mapping[str, Job], path: Path) -> 
     lines = path.read_text(encoding='utf-8').splitlines() if path.is_file() else []
     try:
         found = {line['part']: line['found'] for line in map(json.loads, lines)}
-    except (ValueError, TypeError, KeyError) as error:
-        raise outdated(path) from error
+    except (ValueError, TypeError, KeyError) as broken:
+        raise outdated(path) from broken
     if not found.keys() <= jobs.keys():
         raise outdated(path)
     if found:
