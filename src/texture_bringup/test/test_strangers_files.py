@@ -24,7 +24,7 @@ import numpy as np
 import pytest
 import yaml
 
-from texture_bringup.launcher import all_arguments
+from texture_bringup.launcher import read
 from texture_core import config as resources
 from texture_core.errors import TextureError
 from texture_drivers.daq import load_daq
@@ -100,9 +100,7 @@ READERS: dict[str, Reader] = {
     'settings': text_file('texture_drivers', 'config/sensors/daq.yaml', load_daq),
     'grades': text_file('texture_papers', 'config/grades/ets_roughness.csv', read_grades),
     'mapping': text_file('texture_recordings', 'config/mappings/icub20.yaml', load_mapping),
-    'launch file': text_file(
-        'texture_bringup', 'launch/emulator.launch.xml', lambda path: all_arguments(Path(path), {})
-    ),
+    'launch file': text_file('texture_bringup', 'launch/emulator.launch.xml', lambda path: read(Path(path), {}, {})),
 }
 CASES = [(name, file) for name, (_, _, files) in READERS.items() for file in files]
 
