@@ -40,11 +40,11 @@ def executables() -> list[str]:
 def holding(command: type) -> type:
     """Return a command of setuptools that writes executables whose stop signals wait until Python can handle them."""
 
-    class Holding(command):
+    class _Holding(command):
         def write_script(self, name: str, contents: str, *more: Any) -> None:
             super().write_script(name, contents.replace('#!', '#!/usr/bin/env -S --block-signal=INT,TERM ', 1), *more)
 
-    return Holding
+    return _Holding
 
 
 def commands() -> list[str]:
