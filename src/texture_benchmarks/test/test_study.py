@@ -23,6 +23,13 @@ def test_a_part_that_fails_leaves_the_others_and_none_is_computed_twice(tmp_path
     assert not (tmp_path / 'parts.jsonl').exists()
 
 
+@pytest.mark.parametrize('line', ['{"part": "zero"', '{"name": "zero", "found": 1}', '{"part": "three", "found": 1}'])
+def test_parts_of_an_older_version_are_not_mixed_with_new_ones(line, tmp_path) -> None:
+    (tmp_path / 'parts.jsonl').write_text(line)
+    with pytest.raises(InvalidData, match=r"parts.jsonl' is of a run with other parts .* remove it"):
+        resumed(lambda job: job, {'zero': 0}, tmp_path / 'parts.jsonl')
+
+
 @pytest.mark.parametrize('data', [True, False])
 def test_what_is_missing_is_reported_by_the_benchmark_that_needs_it(tmp_path: Path, data: bool) -> None:
     options = BenchmarkOptions(tmp_path, tmp_path if data else None)

@@ -26,6 +26,7 @@ from texture_benchmarks.study import (
     BenchmarkOptions,
     BenchmarkResult,
     fraction_interval,
+    outdated,
     recorded,
     resumed,
     with_spaced_windows,
@@ -137,6 +138,8 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     found = resumed(work, {name: parts[name] for name in order}, options.out / FINISHED)
     numbers: dict[str, Any] = {table: {} for table in (DISTANCE, SPACING, HALVES, OTHER)}
     for table, row, recipe, cell in (one for name in parts if name in found for one in found[name]):
+        if table not in numbers:
+            raise outdated(options.out / FINISHED)
         numbers[table].setdefault(row, {})[recipe] = cell
     numbers['missing'] = [name for name in parts if name not in found]
     numbers['missing'] += [f'{part} (no recordings)' for name in absent for part in SETS[name].parts]

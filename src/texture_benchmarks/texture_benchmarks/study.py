@@ -94,7 +94,12 @@ def resumed(work: Callable[[Job], Out], jobs: Mapping[str, Job], path: Path) -> 
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     lines = path.read_text(encoding='utf-8').splitlines() if path.is_file() else []
-    found = {line['part']: line['found'] for line in map(json.loads, lines)}
+    try:
+        found = {line['part']: line['found'] for line in map(json.loads, lines)}
+    except (ValueError, TypeError, KeyError) as broken:
+        raise outdated(path) from broken
+    if not found.keys() <= jobs.keys():
+        raise outdated(path)
     if found:
         print(f"{len(found)} parts are of an earlier run, from '{path}'; remove it to compute all again", flush=True)
     left = [name for name in jobs if name not in found]
@@ -109,6 +114,11 @@ def resumed(work: Callable[[Job], Out], jobs: Mapping[str, Job], path: Path) -> 
     if found.keys() == jobs.keys():
         path.unlink()
     return {name: found[name] for name in jobs if name in found}
+
+
+def outdated(path: Path) -> InvalidData:
+    """Return the error for parts of an earlier run that do not fit this one."""
+    return InvalidData(f"'{path}' is of a run with other parts or of an older version; remove it to compute all again")
 
 
 def _forked(work: Callable[[Job], Out], jobs: Sequence[Job]) -> Iterator[tuple[int, Future[Out]]]:

@@ -65,18 +65,6 @@ def test_conditions_choose(launch, condition, model, nodes) -> None:
     assert len(launch(elements, model=model)) == nodes
 
 
-@pytest.mark.parametrize('name', ['model', 'device'])
-def test_an_argument_that_names_a_pipe_is_refused_at_once_unless_it_is_a_device(launch, name) -> None:
-    pipe = launch.folder / 'pipe'
-    os.mkfifo(pipe)
-    elements = f'<arg name="{name}"/>'
-    if name == 'device':
-        assert launch(elements, device=str(pipe)) == []
-        return
-    with pytest.raises(InvalidLaunch, match=r"argument 'model' is '.*pipe', which is neither a regular file"):
-        launch(elements, model=str(pipe))
-
-
 @pytest.mark.parametrize(
     ('elements', 'sentence'),
     [

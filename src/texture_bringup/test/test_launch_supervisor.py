@@ -179,7 +179,7 @@ def test_a_node_in_the_place_of_a_dead_one_gets_the_profile_for_restarts(launch,
 
 
 def test_together_the_death_of_any_node_stops_all_and_none_is_restarted(launch) -> None:
-    launched = launch({'good': GOOD, 'phoenix': GOOD}, '--parent', str(os.getpid()), phoenix='respawn="true"')
+    launched = launch({'good': GOOD, 'phoenix': GOOD}, '--together', phoenix='respawn="true"')
     pids = [launched.ready(), launched.ready()]
     phoenix = next(line for line in launched.lines if line.startswith('[phoenix] ready'))
     os.kill(int(phoenix.split()[-1]), signal.SIGKILL)

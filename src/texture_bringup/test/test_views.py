@@ -11,7 +11,7 @@ from sensor_msgs.msg import Image
 from texture_msgs import msg
 from visualization_msgs.msg import Marker
 
-from texture_bringup.nodes.views import Views, curve, path_colours, taxel_image
+from texture_bringup.nodes.views import Views, curve, taxel_image
 from texture_core.ros import SENSOR_QOS, STATE_QOS, to_msg, to_ns
 from texture_core.ros_testing import LocalGraph
 from texture_core.types import ExplorationState, Phase, TactileSignal
@@ -45,12 +45,6 @@ def test_a_taxel_stands_in_the_image_where_its_name_says():
     image = taxel_image(batch([5.0, 6.0, 7.0], channels=('taxel_0_1', 'taxel_1_0', 'taxel_2_1')))
     assert image.shape == (3, 2)
     assert (image[0, 1], image[1, 0], image[2, 1], math.isnan(image[0, 0])) == (5.0, 6.0, 7.0, True)
-
-
-def test_a_stronger_vibration_has_a_brighter_colour():
-    weak, middle, strong = path_colours(np.array([1e-6, 1e-3, 1.0])).sum(axis=1)
-    assert weak < middle < strong
-    assert np.isfinite(path_colours(np.zeros(3))).all()
 
 
 @pytest.mark.realtime
@@ -91,8 +85,4 @@ def test_each_view_comes_to_who_looks():
         assert np.frombuffer(bytes(images[0].data), np.float32).tolist() == [1.0, 2.0, 3.0, 4.0]
         assert (images[0].height, images[0].width, images[0].encoding, images[0].step) == (2, 2, '32FC1', 8)
         assert (wrenches[0].wrench.force.z, wrenches[0].wrench.torque.x) == (3.0, pytest.approx(0.04))  # N and N m
-        assert (paths[0].header.frame_id, paths[0].points[0].y, len(paths[0].colors)) == (
-            'surface',
-            0.2,
-            len(paths[0].points),
-        )
+        assert (paths[0].header.frame_id, paths[0].points[0].y) == ('surface', 0.2)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import asyncio
 import concurrent.futures
+import contextlib
 import hmac
 import ipaddress
 import os
@@ -185,6 +186,7 @@ MAX_BODY_BYTES = 4096
 MAX_MESSAGE_BYTES = 1024
 MAX_VIEWERS = 16
 HEARTBEAT_S = 10.0
+NEWS_S = 0.03  # how often it is looked whether there is a new frame
 REQUEST_S, LOOK_S = 15.0, 1.0  # that a request may take to come, and how often that is looked at
 SERVER_CLOSING_S = 1.0
 PAGE: Mapping[str, tuple[str, str]] = {
@@ -209,40 +211,32 @@ class Viewers:
     def __init__(self) -> None:
         self._frame = ''
         self._number = 0
-        self._news = asyncio.Event()
         self.sockets: set[web.WebSocketResponse] = set()
 
     def show(self, frame: str) -> None:
         """Replace the frame; called in the loop of the server."""
         self._frame, self._number = frame, self._number + 1
-        self._news.set()
-        self._news = asyncio.Event()
 
     async def watch(self, request: web.Request) -> web.StreamResponse:
         """Send frames to the page of a request until it closes."""
         if len(self.sockets) >= MAX_VIEWERS:
             return _failure(503, f'{MAX_VIEWERS} pages are open already; close one')
-        before = self._number  # outdated, as no frames are made without a viewer
+        sent = self._number  # outdated, as no frames are made without a viewer
         socket = web.WebSocketResponse(heartbeat=HEARTBEAT_S, max_msg_size=MAX_MESSAGE_BYTES, timeout=SERVER_CLOSING_S)
         await socket.prepare(request)
         self.sockets.add(socket)
-        sending = asyncio.create_task(self._send_to(socket, before))
         try:
-            async for _ in socket:  # a page sends nothing; this detects when it closes
-                pass
+            while not socket.closed:
+                if sent != self._number:
+                    sent = self._number
+                    await socket.send_str(self._frame)
+                with contextlib.suppress(asyncio.TimeoutError):
+                    await socket.receive(NEWS_S)  # a page sends nothing; this detects when it closes
+        except ConnectionError:  # it closed while a frame was sent
+            pass
         finally:
             self.sockets.discard(socket)
-            sending.cancel()
-            await asyncio.gather(sending, return_exceptions=True)
         return socket
-
-    async def _send_to(self, socket: web.WebSocketResponse, sent: int) -> None:
-        """Send the newest frame after number `sent`, again and again, until the socket closes."""
-        while not socket.closed:
-            if sent == self._number:
-                await self._news.wait()
-            sent = self._number
-            await socket.send_str(self._frame)
 
 
 VIEWERS: web.AppKey[Viewers] = web.AppKey('viewers', Viewers)

@@ -4,13 +4,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import shutil
 import socket
 import tempfile
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -46,11 +45,6 @@ def free_domain() -> int:
     raise LaunchFailed(f'every ROS domain from {DOMAINS[0]} to {DOMAINS[-1]} is in use; stop another program first')
 
 
-def isolated(domain_id: int, environment: Mapping[str, str]) -> dict[str, str]:
-    """Return an environment for processes that meet in a domain of this machine only."""
-    return {**environment, 'ROS_DOMAIN_ID': str(domain_id), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
-
-
 def _is_free(port: int) -> bool:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
@@ -61,12 +55,10 @@ def _is_free(port: int) -> bool:
 
 
 def _free_port() -> int:
-    """Return the usual port of the dashboard, or one that is free."""
-    for port in (8085, 0):
-        with socket.socket() as probe, contextlib.suppress(OSError):
-            probe.bind(('127.0.0.1', port))
-            return int(probe.getsockname()[1])
-    raise LaunchFailed('no TCP port is free; stop another program first')
+    """Return a TCP port that is free."""
+    with socket.socket() as probe:
+        probe.bind(('127.0.0.1', 0))
+        return int(probe.getsockname()[1])
 
 
 # --------------------
@@ -192,7 +184,12 @@ def demonstrate(out: Path, recipe: str, seed: int, *, dashboard: bool = False) -
         if dashboard:
             arguments |= {'dashboard': 'true', 'dashboard_port': _free_port()}
         domain_id = free_domain()
-        environment = isolated(domain_id, {**os.environ, 'ROS_LOG_DIR': str(folder / 'ros_log')})
+        environment = {
+            **os.environ,
+            'ROS_DOMAIN_ID': str(domain_id),
+            'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+            'ROS_LOG_DIR': str(folder / 'ros_log'),
+        }
         with (
             ChildLauncher('emulator', arguments, environment, out / LOG) as launcher,
             Operator(domain_id=domain_id, guard=launcher.check) as operator,

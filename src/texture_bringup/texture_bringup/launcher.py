@@ -5,21 +5,19 @@
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import os
 import re
-import selectors
 import shlex
 import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
-from typing import IO, Any, TypeVar
+from typing import Any, TypeVar
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
@@ -37,12 +35,14 @@ from texture_core.config import (
     read_bounded,
     unknown_name,
 )
-from texture_core.errors import InvalidLaunch, LaunchFailed, TextureError
+from texture_core.errors import InvalidLaunch, LaunchFailed, TextureError, UnknownName
 
 # --------------------
 # A sub-command as a child process of another program, which watches and ends it.
 
 ChildT = TypeVar('ChildT', bound='Child')
+# The kernel sends a child the signal named behind this when its parent, or the thread that started it, has died.
+END_WITH_PARENT = ('setpriv', '--pdeathsig')
 STOP_DEADLINE_S = 30.0  # a launcher kills its nodes after 8 s, a recorder may be behind
 
 
@@ -51,7 +51,7 @@ class Child:
 
     def __init__(self, arguments: Sequence[str], environment: Mapping[str, str], log: Path) -> None:
         self.log = log
-        self._command = [sys.executable, '-m', 'texture_bringup.command', *arguments]
+        self._command = [*END_WITH_PARENT, 'INT', sys.executable, '-m', 'texture_bringup.command', *arguments]
         self._environment = environment
         self._process: subprocess.Popen[bytes] | None = None
 
@@ -95,7 +95,7 @@ class ChildLauncher(Child):
 
     def __init__(self, file: str, arguments: Mapping[str, object], environment: Mapping[str, str], log: Path) -> None:
         given = (f'{name}:={value}' for name, value in arguments.items())
-        super().__init__(['launch', '--parent', str(os.getpid()), file, *given], environment, log)
+        super().__init__(['launch', '--together', file, *given], environment, log)
 
     def check(self) -> None:
         """Raise LaunchFailed if the nodes have ended."""
@@ -155,24 +155,11 @@ def command(node: NodeDescription, parameter_folder: Path) -> list[str]:
 # --------------------
 # One node as a separate process group, which ends with the launcher.
 
-PR_SET_PDEATHSIG = 1  # linux/prctl.h
-LIBC = ctypes.CDLL(None)
-CHUNK = 65536
+CLOSE_S = 1.0  # for the last lines of a process that has ended; one that left the group may hold the pipe open
 
 
-def end_with(parent: int, number: signal.Signals) -> None:
-    """Let the kernel send this process a signal when its parent dies, however it dies."""
-    if hasattr(LIBC, 'prctl'):
-        LIBC.prctl(PR_SET_PDEATHSIG, number)
-    if os.getppid() != parent:  # it died before the call above
-        os._exit(1)
-
-
-class RunningNode(subprocess.Popen[bytes]):
-    """A running node, and the lines that it writes.
-
-    Start it from the main thread of a program without other threads: the kernel ends it with the thread that did.
-    """
+class RunningNode(subprocess.Popen[str]):
+    """A running node, and a thread that shows the lines that it writes. Start it from the main thread."""
 
     def __init__(
         self,
@@ -186,48 +173,32 @@ class RunningNode(subprocess.Popen[bytes]):
         self.signals = 0  # stop signals sent so far
         self.last = ''  # line that it wrote
         self._say = say
-        try:
-            super().__init__(
-                command_line,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT,
-                # A pipe would hold the output of Python programs back until 8 KiB have come together.
-                env={**environment, 'PYTHONUNBUFFERED': '1'},
-                preexec_fn=partial(end_with, os.getpid(), signal.SIGTERM),
-                start_new_session=True,
-            )
-        except OSError as error:
-            raise LaunchFailed(f"'{command_line[0]}' cannot be started: {error.strerror}") from error
-        assert self.stdout is not None
-        self.stream: IO[bytes] = self.stdout
-        self._begun = b''  # line
-        os.set_blocking(self.stream.fileno(), False)
+        super().__init__(
+            [*END_WITH_PARENT, 'TERM', *command_line],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            # A pipe would hold the output of Python programs back until 8 KiB have come together.
+            env={**environment, 'PYTHONUNBUFFERED': '1'},
+            start_new_session=True,
+            text=True,
+            errors='replace',
+        )
+        say(f'[launch] {node.label} started (process {self.pid})')
+        self._reader = threading.Thread(target=self._read, name=node.label, daemon=True)
+        self._reader.start()
 
-    def read(self) -> bool:
-        """Show the lines that have arrived; return whether anything had."""
-        try:
-            data = os.read(self.stream.fileno(), CHUNK)
-        except BlockingIOError:
-            return False
-        *lines, self._begun = (self._begun + data).split(b'\n')
-        for line in lines:
-            self._show(line)
-        return bool(data)
+    def _read(self) -> None:
+        assert self.stdout is not None
+        for line in self.stdout:
+            self.last = line.rstrip()
+            self._say(f'[{self.node.label}] {self.last}')
 
     def close(self) -> None:
-        """End what the process has started itself, show what is left, also of an unfinished line, and close."""
+        """End what the process has started itself, and show what is left."""
         self.send(signal.SIGKILL)
         self.wait()
-        while self.read():
-            pass
-        if self._begun:
-            self._show(self._begun)
-        self.stream.close()
-
-    def _show(self, line: bytes) -> None:
-        self.last = line.decode(errors='replace').rstrip()
-        self._say(f'[{self.node.label}] {self.last}')
+        self._reader.join(CLOSE_S)
 
     def send(self, number: signal.Signals) -> None:
         """Send a signal to the whole group of the process; one that is gone is left alone."""
@@ -265,7 +236,6 @@ class Supervisor:
         self._commands: dict[int, list[str]] = {}  # by the id of the node
         self._due: list[tuple[float, NodeDescription, int]] = []  # when to start which node, and how often it had died
         self._running: list[RunningNode] = []
-        self._selector = selectors.DefaultSelector()
         self._stopping_since_s: float | None = None
         self._code = 0
         self._cause = ''  # why the launch ends without a request
@@ -284,10 +254,10 @@ class Supervisor:
                 self._due = [(0.0, node, 0) for node in self._nodes]
                 while self._running or self._due:
                     self._step(time.monotonic())
+                    time.sleep(POLL_S)
             finally:
-                for process in list(self._running):  # what an error of the launcher itself has left
-                    self._forget(process)
-                self._selector.close()
+                for process in self._running:  # what an error of the launcher itself has left
+                    process.close()
                 for number, handler in handlers.items():
                     signal.signal(number, handler)
         if self._cause:  # repeated, as nodes that are being stopped write many lines
@@ -307,9 +277,6 @@ class Supervisor:
             if when <= now:
                 self._due.remove((when, node, deaths))
                 self._start(node, deaths)
-        for key, _ in self._selector.select(POLL_S):
-            if not key.data.read():  # the end of the stream: it would stay readable for ever
-                self._selector.unregister(key.fileobj)
         for process in list(self._running):
             code = process.poll()
             if code is not None:
@@ -321,10 +288,8 @@ class Supervisor:
             # In the place of a dead node, with which the others still count, Fast DDS is to be discovered soon.
             environment[PROFILES[0]] = str(folder('texture_bringup', 'config/fastdds') / 'restart.xml')
         process = RunningNode(node, self._commands[id(node)], environment, self._say)
-        self._selector.register(process.stream, selectors.EVENT_READ, process)
         process.deaths = deaths
         self._running.append(process)
-        self._say(f'[launch] {node.label} started (process {process.pid})')
 
     def _send_signals(self, since_s: float) -> None:
         due = sum(at_s <= since_s for at_s, _ in STOP)
@@ -342,7 +307,8 @@ class Supervisor:
             self._say('[launch] nodes that did not end were killed; check whether the finger still presses')
 
     def _end(self, process: RunningNode, code: int) -> None:
-        self._forget(process)
+        self._running.remove(process)
+        process.close()
         node, stopping = process.node, self._stopping_since_s is not None
         # What was started wrongly would only end again.
         restart = node.respawn and code != MISTAKE and not (stopping or self._together)
@@ -357,12 +323,6 @@ class Supervisor:
             self._say(f'[launch] {node.label} is required by the other nodes, which are stopped now')
             self._cause = f'{node.label} {ending(code)}{f": {process.last}" * bool(code and process.last)}'
             self.stop()
-
-    def _forget(self, process: RunningNode) -> None:
-        self._running.remove(process)
-        if process.stream.fileno() in self._selector.get_map():
-            self._selector.unregister(process.stream)
-        process.close()
 
 
 # --------------------
@@ -484,42 +444,16 @@ def given_arguments(texts: Iterable[str]) -> dict[str, str]:
     return given
 
 
-def _refuse_special(given: Mapping[str, str]) -> None:
-    """Refuse an argument that names a special file, which nodes would read without end, unless it is a device."""
-    for name, value in given.items():
-        path = Path(value).expanduser()
-        if 'device' in name or not path.exists() or path.is_file() or path.is_dir():
-            continue
-        raise InvalidLaunch(
-            f"argument '{name}' is '{value}', which is neither a regular file nor a folder; give the path of one"
-        )
-
-
 def read(path: Path, given: Mapping[str, str], environment: Mapping[str, str]) -> list[NodeDescription]:
     """Return the nodes of a launch file, in its order."""
-    _refuse_special(given)
     reader = _Reader(given, environment)
     reader.read_file(path)
     for name in given:
         if name not in reader.declared:
-            raise unknown_name(name, reader.declared, f'argument of {path.name}')
+            error = unknown_name(name, reader.declared, f'argument of {path.name}')
+            explorer = '. Parameters of the explorer are in the file of explorer_params:=FILE'
+            raise UnknownName(f'{error}{explorer * ("explorer_params" in reader.declared)}')
     return reader.nodes
-
-
-def all_arguments(path: Path, environment: Mapping[str, str]) -> dict[str, Element]:
-    """Return the `arg` elements of a launch file, and of those it includes at a place that no argument decides."""
-    found: dict[str, Element] = {}
-    waiting, seen = [path], {path}
-    while waiting:
-        root = _root(waiting.pop())
-        for name, element in _declared(root).items():
-            found.setdefault(name, element)
-        for element in root.iter('include'):
-            with contextlib.suppress(TextureError):
-                included = Path(_Reader({}, environment).text(element, 'file'))
-                waiting += [included] * (included not in seen)
-                seen.add(included)
-    return found
 
 
 def joined_namespace(base: str, name: str) -> str:

@@ -29,6 +29,7 @@ from std_srvs.srv import Trigger
 from texture_msgs import action, msg, srv
 
 from texture_bringup.feed import Feed
+from texture_bringup.launcher import typed
 from texture_core.cli import task
 from texture_core.config import unknown_name
 from texture_core.errors import (
@@ -51,25 +52,19 @@ def middleware() -> str:
 # --------------------
 # Parameters of a node from texts, by the types that the node has declared.
 
-BOOLEANS = {'true': True, 'false': False}
-# What reads a text, and what is allowed, by the type of the parameter.
-READERS: dict[int, tuple[Callable[[str], Any], str]] = {
-    ParameterType.PARAMETER_BOOL: (lambda text: BOOLEANS[text.lower()], 'true or false'),
-    ParameterType.PARAMETER_INTEGER: (int, 'a whole number'),
-    ParameterType.PARAMETER_DOUBLE: (float, 'a number'),
-    ParameterType.PARAMETER_STRING: (str, 'any text'),
+TYPES = {
+    ParameterType.PARAMETER_BOOL: 'bool',
+    ParameterType.PARAMETER_INTEGER: 'int',
+    ParameterType.PARAMETER_DOUBLE: 'float',
+    ParameterType.PARAMETER_STRING: 'str',
 }
 
 
 def parameter_from_text(name: str, text: str, kind: int) -> Parameter:
     """Return a parameter of a declared type."""
-    if kind not in READERS:
+    if kind not in TYPES:
         raise InvalidParameter(f"parameter '{name}' is a list, which cannot be set from a text; give it at the start")
-    read, allowed = READERS[kind]
-    try:
-        return Parameter(name, value=read(text))
-    except (ValueError, KeyError):
-        raise InvalidParameter(f"parameter '{name}' is '{text}'; allowed is {allowed}") from None
+    return Parameter(name, value=typed(text, TYPES[kind], f"parameter '{name}'"))
 
 
 # --------------------

@@ -7,6 +7,8 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
+
 from texture_core import cli
 
 
@@ -22,7 +24,8 @@ def test_a_long_task_says_how_far_it_is_and_a_nested_or_short_one_nothing(monkey
     assert capsys.readouterr().err == 'count letters 1 of 2, 0 s\n'
 
 
-def test_ctrl_c_while_a_node_imports_ends_it_with_0_and_without_a_traceback(tmp_path: Path) -> None:
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_stop_while_a_node_imports_ends_it_with_0_and_without_a_traceback(number, tmp_path: Path) -> None:
     nodes, executable = tmp_path / 'slow' / 'nodes', tmp_path / 'lib' / 'slow' / 'one'
     for folder in (nodes, executable.parent):
         folder.mkdir(parents=True)
@@ -32,6 +35,6 @@ def test_ctrl_c_while_a_node_imports_ends_it_with_0_and_without_a_traceback(tmp_
     command = [sys.executable, str(executable)]
     process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout.readline() == 'imports\n'
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     assert process.communicate(timeout=30.0) == ('', '')
     assert process.returncode == 0

@@ -12,5 +12,6 @@ from pathlib import Path
 def node() -> None:
     """Run the node after which the executable lib/PACKAGE/NODE is named; Ctrl-C during its imports ends it with 0."""
     signal.signal(signal.SIGINT, lambda *_: os._exit(0))
+    signal.signal(signal.SIGTERM, lambda *_: os._exit(0))
     package, name = Path(sys.argv[0]).parts[-2:]
     import_module(f'{package}.nodes.{name}').main()

@@ -31,7 +31,7 @@ def test_slides_like_those_of_the_training_are_within_the_domain():
         (conditions(force_n=3.0), 'force 3 N, trained 0.9 to 1.1 N'),
         (conditions(motion='circular'), "motion 'circular', trained 'linear_slide'"),
         (conditions(sensor='biotac'), "sensor 'biotac', trained 'tsf85'"),
-        (conditions(directions_rad=(1.57,)), 'direction 1.57 rad, trained 0 rad'),
+        (conditions(directions_rad=(1.57,)), 'direction 90°, trained 0°'),
     ],
 )
 def test_each_condition_that_was_not_trained_is_named_with_what_was(came, sentence):
@@ -65,9 +65,9 @@ def test_what_is_unknown_in_the_slide_or_in_the_training_is_not_compared():
         (0.3, ''),
         (-0.3, ''),
         (0.75, ''),
-        (1.2, 'direction 1.2 rad, trained 0.6 rad'),
+        (1.2, 'direction 69°, trained 34°'),
         (3.1 - math.tau, ''),
-        (2.7, 'direction 2.7 rad, trained 3.1 rad'),
+        (2.7, 'direction 155°, trained 178°'),
     ],
 )
 def test_a_direction_is_trained_if_it_is_near_one_that_was_also_across_the_back(direction, sentence):
@@ -78,7 +78,7 @@ def test_a_direction_is_trained_if_it_is_near_one_that_was_also_across_the_back(
 def test_to_and_fro_is_trained_if_both_directions_are():
     both = conditions(directions_rad=(0.0, 3.14))
     assert trained_on(conditions(), conditions(directions_rad=(math.pi,))).deviation(both) == ''
-    assert TRAINED.deviation(both) == 'outside the training: direction 3.14 rad, trained 0 rad'
+    assert TRAINED.deviation(both) == 'outside the training: direction 180°, trained 0°'
 
 
 def at_level(rms, channel='signal/pac', **known):

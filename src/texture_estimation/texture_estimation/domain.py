@@ -151,7 +151,8 @@ class Domain:
             for direction in conditions.directions_rad:
                 away = {abs(math.remainder(direction - trained, math.tau)): trained for trained in self.directions_rad}
                 if min(away) > DIRECTION_MARGIN_RAD:
-                    yield f'direction {direction:.3g} rad, trained {away[min(away)]:.3g} rad'
+                    nearest = math.degrees(away[min(away)])
+                    yield f'direction {math.degrees(direction):.0f}°, trained {nearest:.0f}°'
                     break
         for channel, rms, *_ in conditions.levels:
             trained = self.levels.get(channel)

@@ -114,8 +114,8 @@ INVALID, UNUSED, OUTSIDE = (
 REFUSED = [
     ('linear_slide', {'speed_m_s': 2.0}, INVALID, 'linear_slide: speed_m_s is 2; allowed is 0.002 to 0.25 m/s'),
     ('linear_slide', {'force_n': -1.0}, INVALID, 'linear_slide: force_n is -1; allowed is 0.1 to 6 N'),
-    ('linear_slide', {'direction_rad': 1e3}, INVALID, 'direction_rad is 1000; allowed is -100 to 100 rad'),
-    ('linear_slide', {'direction_rad': math.inf}, INVALID, 'direction_rad is inf'),
+    ('linear_slide', {'direction_rad': 1e3}, INVALID, 'the direction is 57295.8°; allowed is -5730° to 5730°'),
+    ('linear_slide', {'direction_rad': math.inf}, INVALID, 'the direction is inf°'),
     ('linear_slide', {'distance_m': math.nan}, INVALID, 'distance_m is nan'),
     ('linear_slide', {'radius_m': 0.02, 'turns': 2.0}, UNUSED, 'does not use radius_m and turns; leave it at 0'),
     ('linear_slide', {'distance_m': 2.0}, INVALID, 'distance_m is 2; allowed is 0.002 to 1 m'),

@@ -134,9 +134,10 @@ class SafetyLimits:
                 )
         self.refuse_unused(request, RANGES.keys() - defaults.keys())
         if not abs(request.direction_rad) <= MAX_DIRECTION_RAD:
-            allowed = f'allowed is -{MAX_DIRECTION_RAD:g} to {MAX_DIRECTION_RAD:g} rad'
+            given, most = (math.degrees(angle) for angle in (request.direction_rad, MAX_DIRECTION_RAD))
             raise MotionRefused(
-                f'{request.motion}: direction_rad is {request.direction_rad:g}; {allowed}', field='direction_rad'
+                f'{request.motion}: the direction is {given:g}°; allowed is -{most:.0f}° to {most:.0f}°',
+                field='direction_rad',
             )
         return request
 

@@ -18,7 +18,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -153,14 +153,8 @@ def as_json(result: ExplorationResult) -> dict[str, Any]:
         },
         'roughness': asdict(result.roughness),
     }
-    return cast(dict[str, Any], finite(values))
-
-
-def finite(value: Any) -> Any:
-    """Return a tree of dictionaries with None for each number that is not finite."""
-    if isinstance(value, dict):
-        return {name: finite(one) for name, one in value.items()}
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    known: dict[str, Any] = json.loads(json.dumps(values), parse_constant=lambda _: None)
+    return known
 
 
 def explored(explore: Callable[[ExplorationRequest, Progress], T], request: ExplorationRequest) -> T:

@@ -11,14 +11,14 @@ import sys
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
+from importlib import import_module
 from multiprocessing import get_context
+from operator import attrgetter
 from pathlib import Path
 
 from texture_bringup.launcher import (
     NodeDescription,
     Supervisor,
-    all_arguments,
-    end_with,
     find_launch_file,
     given_arguments,
     read,
@@ -32,88 +32,54 @@ from texture_core.cli import Command, add_namespace, add_parameters, add_seed, p
 def _configure_launch(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('file', help="path of a launch file, or the name of one of the suite's, such as emulator")
     parser.add_argument('arguments', nargs='*', default=[], metavar='NAME:=VALUE', help='arguments of the launch file')
-    parser.add_argument('--parent', type=int, help=argparse.SUPPRESS)
-    parser.add_argument('--show-args', action='store_true', help='show the arguments of the launch file')
+    parser.add_argument('--together', action='store_true', help=argparse.SUPPRESS)
 
 
 def _launch(options: argparse.Namespace) -> int:
     """Run the nodes until they end or Ctrl-C; return 2 if a needed one was started wrongly, 1 if one died, else 0."""
-    child = options.parent is not None  # of a program that needs all nodes: it and they end together
-    if child:
-        end_with(options.parent, signal.SIGINT)
-    path = find_launch_file(options.file)
-    if options.show_args:
-        print(arguments_text(path))
-        return 0
     given = given_arguments(options.arguments)
-    nodes = read(path, given, os.environ)
+    nodes = read(find_launch_file(options.file), given, os.environ)
     refuse_wrong(nodes, set(given.values()))
-    return Supervisor(nodes, _say, together=child).run()
+    return Supervisor(nodes, _say, together=options.together).run()
 
 
-# What a node would refuse, by its program: the parameters of which all are looked at if one of them was given.
+# By program: the function that loads the first of these parameters, and refuses what the node would refuse.
 LOOKED_AT = {
-    'emulator': ('scene', 'surface'),
-    'classifier': ('model',),
-    'roughness_estimator': ('model',),
-    'feature_extractor': ('recipe',),
-    'replay': ('bag',),
+    'emulator': ('texture_simulation.scene', 'load_scene', 'scene', 'surface'),
+    'classifier': ('texture_estimation.model', 'load_model', 'model'),
+    'roughness_estimator': ('texture_estimation.roughness', 'load_roughness_model', 'model'),
+    'feature_extractor': ('texture_features.feature_set', 'FeatureSet.load', 'recipe'),
 }
 
 
-def _look_at(program: str, value: str, *more: str) -> None:
-    """Load what a program would load of its parameters; TextureError if it cannot be."""
-    if program == 'emulator':
-        from texture_simulation.scene import load_scene
-
-        load_scene(value).surface(*more)
-    elif program == 'classifier':
-        from texture_estimation.model import load_model
-
-        load_model(value)
-    elif program == 'roughness_estimator':
-        from texture_estimation.roughness import load_roughness_model
-
-        load_roughness_model(value)
-    elif program == 'feature_extractor':
-        from texture_features.feature_set import FeatureSet
-
-        FeatureSet.load(value)
-    else:
-        from texture_recordings.bags import find_bags
-
-        find_bags([value])
+def _look_at(module: str, load: str, value: str, *surfaces: str) -> None:
+    """Load what a node would load, and the surfaces of a scene; TextureError if they cannot be."""
+    loaded = attrgetter(load)(import_module(module))(value)
+    for surface in surfaces:
+        loaded.surface(surface)
 
 
 def refuse_wrong(nodes: Sequence[NodeDescription], given: set[str]) -> None:
     """Raise, before any node starts, the error of a node of the suite for a value that was given.
 
-    In a separate process: libraries that start threads must not be in a launcher.
+    In a separate process: a launcher that stays needs none of their libraries.
     """
     wanted = []
     for node in nodes:
+        module, load, *names = LOOKED_AT.get(node.executable, ('', ''))
         known = {name: value for one in node.parameters if isinstance(one, Mapping) for name, value in one.items()}
-        values = [str(known.get(name, '')) for name in LOOKED_AT.get(node.executable, ())]
+        values = [str(known.get(name, '')) for name in names]
         if all(values) and given.intersection(values):
-            wanted.append((node.executable, *values))
+            wanted.append((module, load, *values))
     if wanted:
         with ProcessPoolExecutor(1, get_context('fork')) as pool:
             for one in wanted:
                 pool.submit(_look_at, *one).result()
 
 
-def arguments_text(path: Path) -> str:
-    """Return the arguments of a launch file and of those it includes with their defaults, one a line."""
-    items = all_arguments(path, os.environ)
-    given = [f'{name}:={item.get("default", "(required)")}' for name, item in items.items()]
-    width = max(map(len, given), default=0)
-    rows = zip(given, items.values(), strict=True)
-    return '\n'.join(f'{text:<{width}}  {item.get("description", "")}'.rstrip() for text, item in rows)
-
-
 def _say(line: str) -> None:
     try:
-        print(line, flush=True)
+        print(f'{line}\n', end='', flush=True)  # in one piece: nodes write at the same time
     except BrokenPipeError:
         # Who read along has gone: nothing more can be shown, and the nodes are stopped in good order.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -28,7 +28,7 @@ MAX_RATE_HZ = 2500.0  # messages a second of the curve, which plots of other pro
 PATH_S = 0.2  # how often the path is drawn anew
 PATH_POINTS = 5000
 PATH_WIDTH_M = 0.001
-WEAK, STRONG = np.array([0.1, 0.15, 0.5]), np.array([1.0, 0.85, 0.1])  # colours by the power of the vibration
+PATH_COLOUR = ColorRGBA(r=1.0, g=0.85, b=0.1, a=1.0)
 NEWTON_MILLIMETRES = 1e-3
 # rqt_plot and RViz ask for reliable delivery, which a best-effort publisher does not offer.
 VIEW_QOS = QoSProfile(depth=1000)
@@ -65,22 +65,12 @@ def taxel_image(batch: TactileSignal) -> NDArray[np.float32]:
     return image
 
 
-def path_colours(powers: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return red, green and blue, (n, 3), of powers, (n,): they differ by factors, so colours follow the logarithm."""
-    logs = np.log(powers + np.finfo(float).tiny)
-    fraction = (logs - logs.min()) / (np.ptp(logs) or 1.0)
-    colours: NDArray[np.float64] = WEAK + fraction[:, None] * (STRONG - WEAK)
-    return colours
-
-
 class Views(Node):
     """Publish views of the topics in its namespace; each is computed only while it has a subscriber."""
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('views', **kwargs)
         self._points: list[Point] = []
-        self._powers: list[float] = []
-        self._power = 0.0  # of the newest batch
         self._state: ExplorationState | None = None
         self._bad = 0
         self._curve, self._image, self._wrench, self._path = (
@@ -91,7 +81,6 @@ class Views(Node):
             ('signal', self._curve, self._draw),
             ('signal_static', self._image, self._show_taxels),
             ('signal_wrench', self._wrench, self._show_wrench),
-            ('signal', self._path, self._note_power),
         ):
             self.create_subscription(msg.TactileSignal, topic, self._taking(view, take), SENSOR_QOS)
         self.create_subscription(msg.ExplorationState, 'exploration', self._taking(self._path, self._follow), STATE_QOS)
@@ -135,18 +124,14 @@ class Views(Node):
             setattr(shown.wrench.torque, axis, NEWTON_MILLIMETRES * values.get(f't{axis}', math.nan))
         self._wrench.publish(shown)
 
-    def _note_power(self, batch: TactileSignal) -> None:
-        self._power = float(np.nan_to_num(batch.samples.var(axis=0).mean()))
-
     def _follow(self, state: ExplorationState) -> None:
         if state.phase is not Phase.SLIDE or math.isnan(state.x_m):
             return
         if self._state is None or state.exploration_id != self._state.exploration_id:
-            self._points, self._powers = [], []
+            self._points = []
         self._state = state
         if len(self._points) < PATH_POINTS:
             self._points.append(Point(x=state.x_m, y=state.y_m, z=state.z_m))
-            self._powers.append(self._power)
 
     def _draw_path(self) -> None:
         """Publish the path of the slide; each exploration replaces the one before."""
@@ -154,9 +139,7 @@ class Views(Node):
             return
         path = Marker(type=Marker.LINE_STRIP, action=Marker.ADD, ns='path', frame_locked=True, points=self._points)
         path.header = Header(stamp=to_stamp(self._state.stamp_ns), frame_id=self._state.frame_id)
-        path.pose.orientation.w, path.scale.x = 1.0, PATH_WIDTH_M
-        colours = path_colours(np.array(self._powers)).tolist()
-        path.colors = [ColorRGBA(r=red, g=green, b=blue, a=1.0) for red, green, blue in colours]
+        path.pose.orientation.w, path.scale.x, path.color = 1.0, PATH_WIDTH_M, PATH_COLOUR
         self._path.publish(path)
 
     def _report(self) -> DiagnosticReport:
