@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -13,7 +14,7 @@ def conditions(speed_m_s=0.05, force_n=1.0, motion='linear_slide', sensor='tsf85
 
 
 def trained_on(*slides, **margins):
-    return Domain.of_slides(slides, ['cork'] * len(slides), **margins)
+    return replace(Domain.of_slides(slides, ['cork'] * len(slides)), **margins)
 
 
 TRAINED = trained_on(conditions(0.045, 0.9), conditions(0.055, 1.1))

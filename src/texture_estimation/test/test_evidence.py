@@ -162,17 +162,6 @@ def test_five_windows_vote_together_and_then_the_next_five():
     assert voted([0, 0, 0, 0, 0, 1, 1, 1, 1, 1], group=0)[-1] is None  # five against five of all ten
 
 
-def test_the_live_vote_is_that_of_the_search():
-    rng = np.random.default_rng(0)
-    scores = rng.normal(size=(12, 2))
-    rule = MajorityVote()
-    means, counts = followed(rule, rule.window_evidence(log_softmax(scores)), 1.0)
-    decided = [int(rule.log_posterior(means[-1], counts[-1], 1.0).argmax())]
-    votes = scores.argmax(axis=1)[5:10]  # the second complete group of five
-    assert decided == [int(votes.mean() > 0.5)]
-    assert voted(scores.argmax(axis=1))[-1] == decided[0]
-
-
 @pytest.mark.parametrize(
     ('share', 'votes', 'answer'),
     [

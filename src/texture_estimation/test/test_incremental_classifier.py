@@ -49,6 +49,8 @@ def test_one_slide_adds_a_texture_and_the_others_stay_known(model, examples, sil
         np.mean(np.array(one.decide(examples.values)) == examples.labels) for one in (model, classifier.model)
     )
     assert after > before - 0.03
+    trained, now = model.predict_log_proba(examples.values), classifier.model.predict_log_proba(examples.values)
+    np.testing.assert_allclose(np.diff(now[:, :-1]), np.diff(trained), atol=1e-9)  # which keep their ratios
 
 
 def test_more_examples_of_a_known_texture_add_no_label(model, examples, measured):

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from texture_core.config import folder, shipped
-from texture_core.errors import InvalidParameter, TextureError
+from texture_core.errors import TextureError
 from texture_core.types import Array
 from texture_estimation.recipe import Recipe, load_recipe
-from texture_estimation.roughness import RoughnessRecipe, load_roughness_recipe
+from texture_estimation.roughness import load_roughness_recipe
 from texture_features.feature_set import InputFeatures
 from texture_features.windows import WindowBatch
 
@@ -49,12 +49,6 @@ def test_a_wrong_recipe_gets_one_sentence_that_states_where(more, sentence):
         Recipe.from_mapping({**INPUTS, **more}, 'mine')
     assert "recipe 'mine'" in str(caught.value)
     assert '\n' not in str(caught.value)
-
-
-def test_what_rules_decisions_about_textures_is_no_parameter_of_a_roughness_recipe():
-    assert RoughnessRecipe.from_mapping({**INPUTS, 'training': {'folds': 5}}, 'mine').training.folds == 5
-    with pytest.raises(InvalidParameter, match='false_rejection_rate'):
-        RoughnessRecipe.from_mapping({**INPUTS, 'training': {'false_rejection_rate': 0.1}}, 'mine')
 
 
 def test_augmentation_is_a_section_of_training_that_only_a_network_takes():

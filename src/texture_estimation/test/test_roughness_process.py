@@ -39,6 +39,7 @@ def test_a_single_texture_cannot_be_trained_on(graded_windows) -> None:
         ({'learner': 'mlp'}, "no key 'learner'"),
         ({'regressor': 'gaussian_proces'}, "did you mean 'gaussian"),
         ({'training': {'fold': 5}}, "did you mean 'folds'"),
+        ({'training': {'false_rejection_rate': 0.1}}, "no parameter 'false_rejection_rate'"),
     ],
 )
 def test_a_wrong_recipe_gets_one_sentence_that_states_where(more, sentence) -> None:

@@ -19,7 +19,7 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from texture_core.errors import InvalidData
 from texture_core.types import Array, Rejection
 from texture_estimation.domain import Domain
-from texture_estimation.evidence_rules import EvidenceRule
+from texture_estimation.evidence_rules import ROUNDING, EvidenceRule
 from texture_estimation.gaussians import DISTANCE_WINDOWS, ClassDistance
 from texture_estimation.learners.learner import is_tied
 
@@ -55,7 +55,6 @@ def slides_needed(rate: float) -> float:
 # Lengths of evidence at which everything is fitted, in windows that do not overlap: the start of a slide is like no
 # other part of it. Between two of them it is linear.
 LEVELS = (1.0, 1.5, 2.0, 3.0, 5.0, 10.0)
-ROUNDING = 1e-9
 
 
 class SlideDistance:
@@ -63,23 +62,22 @@ class SlideDistance:
 
     def __init__(self, distance: ClassDistance) -> None:
         self._distance = distance
-        self._sum: Array | None = None
+        self._sum: Any = 0.0
         self._count = 0
         self._found: dict[int, float] = {}  # the sum stops changing after a few windows, and the label rarely changes
 
     def add(self, values: Array, effective_windows: float) -> None:
         """Add what of a window is compared, (n_compared,)."""
-        if self._sum is not None and effective_windows > DISTANCE_WINDOWS + ROUNDING:
+        if self._count and effective_windows > DISTANCE_WINDOWS + ROUNDING:
             return
-        self._sum = values if self._sum is None else self._sum + values
+        self._sum = self._sum + values
         self._count += 1
         self._found.clear()
 
     def to(self, label: int) -> float:
-        """Return the distance to the slides of a label; infinite without slides of it or windows."""
+        """Return the distance of a slide with a window or more to the slides of a label; infinite without any of it."""
         if label not in self._found:
-            mean = None if self._sum is None else self._sum / self._count
-            self._found[label] = math.inf if mean is None else float(self._distance.score(mean, label))
+            self._found[label] = float(self._distance.score(self._sum / self._count, label))
         return self._found[label]
 
 
@@ -153,8 +151,8 @@ class Limits(NamedTuple):
     novel: float  # distance beyond which a surface that is rejected is novel, else it is ambiguous
     probable: float  # least probability of a label in the prediction set
 
-    def score(self, margin: float, distance: float) -> float:
-        """Return the log-odds that a slide is one of its label's."""
+    def score(self, margin: Any, distance: Any) -> Any:
+        """Return the log-odds that a slide, or each slide of arrays (n,), is one of its label's."""
         return self.offset + self.margin * margin + self.distance * distance
 
     def accepts(self, margin: float, distance: float) -> bool:
@@ -187,18 +185,17 @@ def _rank(slides: int, rate: float) -> int:
     return math.floor((slides + 1) * rate + ROUNDING)
 
 
-def _least_score(fitted: tuple[float, float, float], wrong: Array, unknown: Array, rate: float) -> float:
+def _least_score(limits: Limits, wrong: Array, unknown: Array, rate: float) -> float:
     """Return the score above which few labels are wrong: this fraction of all trials, and half of it as they are.
 
     `unknown` are the slides without their label, one for each, and `wrong` those that are wrong with it.
     """
-    scores_of_wrong, every = _score(fitted, wrong), np.concatenate([_score(fitted, wrong), _score(fitted, unknown)])
-    limits = [-NEVER]
-    for scores, most in ((scores_of_wrong, rate * len(unknown) / TRIALS), (every, rate * TRIALS * len(unknown))):
+    least, every = -NEVER, np.concatenate([wrong, unknown])
+    for rows, most in ((wrong, rate * len(unknown) / TRIALS), (every, rate * TRIALS * len(unknown))):
         kept = int(most + ROUNDING)
-        if kept < len(scores):
-            limits.append(math.nextafter(float(np.sort(scores)[::-1][kept]), math.inf))
-    return max(limits)
+        if kept < len(rows):
+            least = max(least, math.nextafter(np.sort(limits.score(*rows.T))[::-1][kept], math.inf))
+    return least
 
 
 def _at(slides: Sequence[HeldOutSlide], length: float) -> tuple[Array, Array, NDArray[np.bool_]]:
@@ -220,33 +217,29 @@ def _limits_at(
     """
     # Slides like those of the training: few right ones are rejected, few wrong ones and few unknown ones accepted.
     scored, unknown, right = _at(near, length)
+    none = Limits(0.0, 0.0, 0.0, NEVER, math.inf, NEVER, 0.0, probable)
     if not right.any():
-        return Limits(0.0, 0.0, 0.0, NEVER, math.inf, NEVER, 0.0, probable)
-    fitted = _regression(scored[right], unknown)
-    known = np.sort(_score(fitted, scored[right]))
+        return none
+    offset, margin, distance = _regression(scored[right], unknown)
+    limits = none._replace(offset=offset, margin=margin, distance=distance)
+    known = np.sort(limits.score(*scored[right].T))
     rank = max(_rank(len(known), rates.false_rejection_rate), 1)
-    accepted = max(float(known[rank - 1]), _least_score(fitted, scored[~right], unknown, rates.max_accepted_wrong))
-    novel = float(np.sort(scored[right, 1])[-rank])
+    accepted = max(float(known[rank - 1]), _least_score(limits, scored[~right], unknown, rates.max_accepted_wrong))
+    limits = limits._replace(accepted=accepted, novel=float(np.sort(scored[right, 1])[-rank]))
     if not far:
-        return Limits(*fitted, accepted, math.inf, NEVER, novel, probable)
+        return limits
 
     # This holds so far that few slides of left-out places are accepted and wrong; beyond, more is needed.
     scored, _, right = _at(far, length)
     wrong = scored[~right]
     allowed = int(len(far) * rates.max_accepted_wrong / TRIALS)
-    passed = np.sort(wrong[_score(fitted, wrong) >= accepted, 1])
-    reach = max(novel, float(passed[allowed])) if len(passed) > allowed else math.inf
-    inside, beyond = (wrong[where] for where in (wrong[:, 1] <= reach, wrong[:, 1] > reach))
-    left = max(0, allowed - int((_score(fitted, inside) >= accepted).sum()))
-    scores = np.sort(_score(fitted, beyond))[::-1]
-    accepted_far = math.nextafter(float(scores[left]), math.inf) if left < len(scores) else accepted
-    return Limits(*fitted, accepted, reach, max(accepted, accepted_far), novel, probable)
-
-
-def _score(fitted: tuple[float, float, float], rows: Array) -> Array:
-    offset, margin, distance = fitted
-    scores: Array = offset + margin * rows[:, 0] + distance * rows[:, 1]
-    return scores
+    scores, distances = limits.score(*wrong.T), wrong[:, 1]
+    passed = np.sort(distances[scores >= accepted])
+    reach = max(limits.novel, float(passed[allowed])) if len(passed) > allowed else math.inf
+    left = max(0, allowed - int((scores[distances <= reach] >= accepted).sum()))
+    beyond = np.sort(scores[distances > reach])[::-1]
+    accepted_far = math.nextafter(beyond[left], math.inf) if left < len(beyond) else accepted
+    return limits._replace(reach=reach, accepted_far=max(accepted, accepted_far))
 
 
 # --------------------

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -90,11 +90,8 @@ class Domain:
             raise InvalidData(f'the directions of a domain are {self.directions_rad}; finite ones are needed')
 
     @classmethod
-    def of_slides(
-        cls, conditions: Iterable[SlideConditions], labels: Iterable[str], speed_margin: float = SPEED_MARGIN,
-        force_margin: float = FORCE_MARGIN,
-    ) -> Domain:  # fmt: skip
-        """Return the domain of a model that is trained on slides."""
+    def of_slides(cls, conditions: Iterable[SlideConditions], labels: Iterable[str]) -> Domain:
+        """Return the domain of a model that is trained on slides, with the usual margins."""
         slides, labels = tuple(conditions), tuple(labels)
         return cls(
             motions=_names(slide.motion for slide in slides),
@@ -105,8 +102,6 @@ class Domain:
             levels=_levels(slides),
             slides=dict(Counter(labels)),
             places=_places(slides, labels),
-            speed_margin=speed_margin,
-            force_margin=force_margin,
         )
 
     @property
@@ -133,31 +128,28 @@ class Domain:
 
     def deviation(self, conditions: SlideConditions | RunningConditions) -> str:
         """Return how an exploration lies outside this domain, in one sentence; '' if it lies within."""
-        found = '; '.join(self._deviations(conditions))
-        return f'{OUTSIDE}: {found}' if found else ''
-
-    def _deviations(self, conditions: SlideConditions | RunningConditions) -> Iterator[str]:
-        speed, force = conditions.speed_m_s, conditions.force_n
+        found, speed, force = list[str](), conditions.speed_m_s, conditions.force_n
         if is_beyond(speed, self.speed_m_s, self.speed_margin):
-            yield f'speed {speed:.3g} m/s, trained {_range(self.speed_m_s)} m/s'
+            found.append(f'speed {speed:.3g} m/s, trained {_range(self.speed_m_s)} m/s')
         if is_beyond(force, self.force_n, self.force_margin):
-            yield f'force {force:.3g} N, trained {_range(self.force_n)} N'
+            found.append(f'force {force:.3g} N, trained {_range(self.force_n)} N')
         if self.motions and conditions.motion and conditions.motion not in self.motions:
-            yield f"motion '{conditions.motion}', trained {_listed(self.motions)}"
+            found.append(f"motion '{conditions.motion}', trained {_listed(self.motions)}")
         sensor = '' if conditions.sensor.startswith(REPLAYS) else conditions.sensor
         if self.sensors and sensor and sensor not in self.sensors:
-            yield f"sensor '{sensor}', trained {_listed(self.sensors)}"
+            found.append(f"sensor '{sensor}', trained {_listed(self.sensors)}")
         if self.directions_rad and conditions.motion not in TURNING_MOTIONS:
             for direction in conditions.directions_rad:
                 away = {abs(math.remainder(direction - trained, math.tau)): trained for trained in self.directions_rad}
                 if min(away) > DIRECTION_MARGIN_RAD:
                     nearest = math.degrees(away[min(away)])
-                    yield f'direction {math.degrees(direction):.0f}°, trained {nearest:.0f}°'
+                    found.append(f'direction {math.degrees(direction):.0f}°, trained {nearest:.0f}°')
                     break
         for channel, rms, *_ in conditions.levels:
             trained = self.levels.get(channel)
             if is_beyond(rms, trained, LEVEL_MARGIN):
-                yield f'signal level {rms:.3g} of {channel}, trained {_range(trained)}'
+                found.append(f'signal level {rms:.3g} of {channel}, trained {_range(trained)}')
+        return f'{OUTSIDE}: {"; ".join(found)}' if found else ''
 
 
 def _directions(slides: Sequence[SlideConditions]) -> tuple[float, ...]:

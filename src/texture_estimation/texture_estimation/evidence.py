@@ -11,9 +11,8 @@ import numpy as np
 from texture_core.types import NANOSECONDS, Array, FeatureVector, Rejection, TextureEstimate
 from texture_estimation.acceptance import SlideDistance, margin_of
 from texture_estimation.evidence_rules import GroupedEvidence, followed
-from texture_estimation.gaussians import GaussianClasses, SlideMoments
 from texture_estimation.learners.learner import trust
-from texture_estimation.model import LEAST_PROBABILITY, TextureModel
+from texture_estimation.model import INVERSE_TEMPERATURE, TextureModel
 from texture_features.feature_set import RunningConditions, fingerprint_difference
 from texture_features.windows import WindowParams
 
@@ -76,21 +75,18 @@ class EvidenceAccumulator:
                 self._message = (
                     f'{vector.skipped} of {windows} windows were left out, as samples were lost or not finite'
                 )
-            return self._estimate(vector, final=True)
-        if self.model is not None:
+        elif self.model is not None:
             self._predict(vector, self.model)
-        return self._estimate(vector, final=False)
+        return self._estimate(vector)
 
     def _start(self, exploration_id: str) -> None:
         self._exploration_id = exploration_id
         self._over = False
         self._windows = self._evidence_ns = self._window_ns = self._end_ns = 0
         self._misfit = False  # features of another set came
-        self._message = NO_MODEL
+        self._message = '' if self.model else NO_MODEL
         if (model := self.model) is not None:
-            self._message = ''
-            self._evidence = GroupedEvidence(model.recipe.evidence, model.n_predicted)
-            self._moments = SlideMoments(len(model.names)) if model.added_slides else None
+            self._evidence = GroupedEvidence(model.recipe.evidence, len(model.labels))
             distance = model.active_acceptance.distance
             self._distance = SlideDistance(distance) if distance else None
         self._conditions = RunningConditions()
@@ -117,17 +113,16 @@ class EvidenceAccumulator:
         self._window_ns = round(vector.window_s * NANOSECONDS)
         end = vector.start_ns + self._window_ns
         self._evidence_ns += max(0, end - max(vector.start_ns, self._end_ns))
-        effective_windows = self._evidence_ns / self._window_ns
-        evidence = model.recipe.evidence.window_evidence(scores)
-        self._evidence.add(evidence, effective_windows, float(trust(model.predictor, vector.values)))
         self._end_ns = max(end, self._end_ns)
-        if self._moments is not None:
-            self._moments.add(vector.values)
+        # The effective number of windows follows from the sliding time that they cover, whatever their weights.
+        self._effective_windows = self._evidence_ns / self._window_ns
+        evidence = model.recipe.evidence.window_evidence(scores)
+        self._evidence.add(evidence, self._effective_windows, float(trust(model.predictor, vector.values)))
         if self._distance is not None:
-            self._distance.add(compared, effective_windows)
+            self._distance.add(compared, self._effective_windows)
 
-    def _estimate(self, vector: FeatureVector, final: bool) -> TextureEstimate:
-        model = self.model
+    def _estimate(self, vector: FeatureVector) -> TextureEstimate:
+        model, final = self.model, vector.last
         if model is None or not self._windows:
             return TextureEstimate(
                 stamp_ns=vector.start_ns,
@@ -138,40 +133,29 @@ class EvidenceAccumulator:
                 model=model.name if model else '',
                 message=self._message or (no_window(model.recipe.feature_set.windows) if model and final else ''),
             )
-        # The effective number of windows follows from the sliding time that they cover, whatever their weights.
-        effective_windows = self._evidence_ns / self._window_ns
-        mean, deciding = self._evidence.mean, self._evidence.windows
-        probabilities = model.recipe.evidence.posterior(mean, deciding, model.tempering_exponent)
-        added, moments = model.slide_gaussians, self._moments
-        if moments is not None and added is not None:
-            log_proba = added.log_proba(moments.mean, moments.variance, effective_windows)
-            probabilities = added.combined(probabilities, log_proba)
+        mean = self._evidence.mean
+        probabilities = model.recipe.evidence.posterior(mean, self._evidence.windows, model.tempering_exponent)
         listed = probabilities.tolist()
         confidence = max(listed)
         best, single = listed.index(confidence), listed.count(confidence) == 1
         acceptance = model.acceptance_of(best)
         second, first = sorted(mean.tolist())[-2:]  # of some tens of labels quicker than a partition
+        if best >= model.n_trained and not model.learns_online:  # tempered for the confidence alone
+            second, first = second / INVERSE_TEMPERATURE, first / INVERSE_TEMPERATURE
         margin = margin_of(first, second)
-        if moments is not None and added is not None:
-            # Gaussians of slides are tempered for the confidence; without that, they are of the size of the evidence.
-            second, first = (math.log(max(one, LEAST_PROBABILITY)) for one in sorted(listed)[-2:])
-            growth = deciding**model.tempering_exponent * GaussianClasses.inverse_temperature
-            to_added = margin_of(first / growth, second / growth)
-            margin = min(margin, to_added) if best < model.n_trained else to_added
         distance = self._distance.to(best) if self._distance else math.inf
-        rejection, decided = acceptance.assess(margin, distance, effective_windows)
+        rejection, decided = acceptance.assess(margin, distance, self._effective_windows)
         if self._deviation:
             rejection = Rejection.OUTSIDE_TRAINING
         elif not single and rejection is Rejection.NONE:
             rejection = Rejection.AMBIGUOUS
         reported = tuple(acceptance.limited(listed))
-        members: list[int] = []
-        missing: tuple[str, ...] = ()
+        members, reasons = list[int](), [self._deviation, self._message]
         if final and not self._deviation:
-            members = acceptance.members(probabilities, effective_windows)
+            members = acceptance.members(probabilities, self._effective_windows)
             too_little = rejection is Rejection.TOO_LITTLE_TRAINING
-            reach = acceptance.domain.reach_reason if rejection is not Rejection.NONE else ''
-            missing = (acceptance.reason if too_little else acceptance.decided_reason, reach)
+            reasons.append(acceptance.reason if too_little else acceptance.decided_reason)
+            reasons.append('' if rejection is Rejection.NONE else acceptance.domain.reach_reason)
         return TextureEstimate(
             stamp_ns=self._end_ns,
             exploration_id=vector.exploration_id,
@@ -186,5 +170,5 @@ class EvidenceAccumulator:
             evidence_s=self._evidence_ns / NANOSECONDS,
             final=final,
             model=model.name,
-            message='; '.join(filter(None, (self._deviation, self._message, *missing))),
+            message='; '.join(filter(None, reasons)),
         )

@@ -12,14 +12,12 @@ import numpy as np
 
 from texture_core.config import param
 from texture_core.types import Array
+from texture_estimation.gaussians import DISTANCE_WINDOWS
 from texture_estimation.learners.learner import log_softmax
 
 # A label without a single vote keeps so much, so that its logarithm is finite.
 MIN_FRACTION = 1e-6
 ROUNDING = 1e-9
-# Effective windows from which a slide counts as late. The novelty of a slide rests on as many, and slides that drift
-# begin to look like other textures after them.
-FULL_WINDOWS = 5.0
 
 
 @dataclass(frozen=True)
@@ -74,8 +72,8 @@ class SoftVote(EvidenceRule):
     )
 
     def window_weight(self, effective_windows: float | Array) -> Any:
-        """Return 1 for the first FULL_WINDOWS effective windows, and `late_weight` for those after them."""
-        return self.late_weight ** (effective_windows > FULL_WINDOWS + ROUNDING)
+        """Return 1 for the first windows, on which the distance rests, and `late_weight` for those after them."""
+        return self.late_weight ** (effective_windows > DISTANCE_WINDOWS + ROUNDING)
 
     def log_posterior(self, mean_evidence: Array, effective_windows: float | Array, tempering_exponent: float) -> Array:
         """Return log softmax(n^tempering_exponent · mean log p), the last axis being the textures."""

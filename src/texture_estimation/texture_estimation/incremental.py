@@ -45,7 +45,7 @@ class IncrementalClassifier:
     """Hold a model and the most recent windows, and update the model with slides of them."""
 
     def __init__(self, model: TextureModel, path: str | Path | None = None) -> None:
-        self.model = model.with_added_slides(model.added_slides)  # which fits the Gaussians before a slide is added
+        self.model = model
         self._path = path
         self._numbers = stored_numbers(path) if path is not None else []  # of the files, one for each added slide
         self._recent_windows: OrderedDict[str, list[Array]] = OrderedDict()
@@ -69,12 +69,14 @@ class IncrementalClassifier:
         self._refuse_without_window(name)
         self._refuse_second_time(name, label)
         added_slide = AddedSlide(label, name, np.stack(self._recent_windows[name]), self._conditions[name].get())
+        model = self.model.with_added_slides((*self.model.added_slides, added_slide))
+        model.validate()
         if self._path is not None:
             number = self._numbers[-1] + 1 if self._numbers else 1
             write_added_slide(self._path, number, added_slide, self.model.feature_set)
             self._numbers.append(number)
-        self.model = self.model.with_added_slides((*self.model.added_slides, added_slide))
-        return self.model.n_examples(label)
+        self.model = model
+        return model.n_examples(label)
 
     def _recent_windows_of(self, exploration_id: str) -> list[Array]:
         """Return the kept windows of an exploration, which counts as the newest one, also while it has none."""

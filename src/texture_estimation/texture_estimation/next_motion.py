@@ -14,11 +14,11 @@ import numpy as np
 
 from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.types import AnyArray, Array, FeatureVector, SlideMotion, group_similar
-from texture_estimation.gaussians import within_scale
 from texture_estimation.learners.learner import group_means, log_loss, log_softmax
 from texture_features.feature_set import fingerprint_difference
 
 SMALLEST = 1e-6  # variance of a feature within textures, in that of all slides: equal to the last bit is luck
+CONSTANT = 1e-12  # largest deviation of a constant feature, relative to its largest value
 SAME_NATS = 1e-9  # informations that differ by less are the same
 LEAST = 2  # slides of one kind over one texture that show how much slides differ; kinds among which to choose
 PARTS = 5  # that are held out in turn, to calibrate the confidence
@@ -151,7 +151,9 @@ def _fit(values: Array, cells: AnyArray, n_textures: int) -> tuple[Array, Array]
     counts = np.bincount(cells)
     means = group_means(values, cells)
     off, freedom = values - means[cells], len(values) - len(counts)
-    scale = within_scale(values, off, freedom, SMALLEST)
+    overall, within = values.var(axis=0), np.square(off).sum(axis=0) / freedom
+    constant = np.sqrt(overall) <= CONSTANT * np.abs(values).max(axis=0)
+    scale = np.sqrt(np.where(constant, np.inf, np.maximum(within, SMALLEST * overall)))
     # The shrinkage takes the number of slides for that of free deviations; means have used up some of them.
     covariance = ledoit_wolf(off / scale, assume_centered=True)[0] * len(values) / freedom
     by_motion = means.reshape(-1, n_textures, values.shape[1])

@@ -262,10 +262,7 @@ class CalibrationParams(TrainingParams):
     """How the examples for training are cut, and on what the interval is calibrated."""
 
     folds: int = param(
-        15,
-        'Number of folds of textures for the calibration; at most one per texture is possible.',
-        low=2,
-        high=1000,
+        15, 'Number of folds of textures for the calibration; at most one per texture is possible.', low=2, high=1000
     )
 
 

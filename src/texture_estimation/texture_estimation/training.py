@@ -250,11 +250,10 @@ class Followed:
             distance = self.distance(predictor, held_out)
             for slide in (one for one in (*self._slides, *self._disturbed) if one.group in held_out):
                 values = slide.values
-                trusted: Array | float = 1.0
                 if predictor is not None:
                     scores, trusted = predictor(values), trust(predictor, values)
                 elif not slide.disturbance and fitted.held_out is not None:
-                    scores = fitted.held_out[self._groups == slide.group]
+                    scores, trusted = fitted.held_out[self._groups == slide.group], 1.0
                 else:
                     continue
                 evidence = rule.window_evidence(log_softmax(scores) * scale)
@@ -383,9 +382,8 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
         fitted, codes, groups, recipe.evidence, hop_ratio, temperature=fitted.temperature
     )
     calibrated, truth = fitted, codes
-    domain = Domain.of_slides(
-        conditions, of_slides, speed_margin=recipe.training.speed_margin, force_margin=recipe.training.force_margin
-    )
+    margins: Any = {'speed_margin': recipe.training.speed_margin, 'force_margin': recipe.training.force_margin}
+    domain = replace(Domain.of_slides(conditions, of_slides), **margins)
     acceptance = Acceptance(0 if fitted.held_out is None else len(slides), recipe.training.rates, domain)
     if not acceptance.reason:
         followed_slides = Followed(bound, examples)
@@ -426,7 +424,7 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
             'calibration': calibrated.note,
             'held_out_window_accuracy': accuracy,
         },
-        examples=TrainingExamples.of(examples.values, codes, groups),
+        examples=TrainingExamples.of(examples.values, codes),
     )
 
 

@@ -45,9 +45,6 @@ def linear_discriminant(
     Source: Fisher 1936; Friedman 1989, "Regularized discriminant analysis"; Hatch et al. 2006, "Within-class covariance
     normalization for SVM-based speaker recognition", for the differences between places.
     """
-    nothing = np.zeros((X.shape[1], n_labels)), np.zeros(n_labels)
-    if np.bincount(y, minlength=n_labels).min() < 2:
-        return nothing
     counted = np.ones(len(X)) if weights is None else weights
     counted = counted / np.bincount(y, counted, n_labels)[y]  # in each class they add up to 1
     means = _sums(X, y, counted, n_labels)
@@ -108,10 +105,7 @@ class Discriminant:
         high=1.0,
     )
     folds: int = param(
-        5,
-        'Number of cross-validation folds for the calibration; more folds take longer to train.',
-        low=2,
-        high=50,
+        5, 'Number of cross-validation folds for the calibration; more folds take longer to train.', low=2, high=50
     )
 
     def fit(self, X: Array, y: Codes, groups: Codes, parts: Codes | None = None) -> Fitted:
@@ -221,10 +215,7 @@ class ForceDiscriminant(Discriminant):
     """
 
     ranges: int = param(
-        4,
-        'Number of ranges of force; more follow the force more closely and need more windows.',
-        low=1,
-        high=32,
+        4, 'Number of ranges of force; more follow the force more closely and need more windows.', low=1, high=32
     )
     width: float = param(
         0.1,

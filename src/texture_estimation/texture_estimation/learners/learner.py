@@ -29,13 +29,13 @@ def hidden_layer(predictor: Predictor) -> Callable[[Array], Array] | None:
     return getattr(predictor, 'activations', None)
 
 
-def trust(predictor: Predictor, X: Array) -> Array:
-    """Return how much each window counts in its slide, (...) of (..., n_features), above 0; 1 if not declared.
+def trust(predictor: Predictor, X: Array) -> Array | float:
+    """Return how much each window counts in its slide, (...) of (..., n_features), above 0; 1 for all if not declared.
 
     A predictor that was trained under some conditions has a method of this name.
     """
     of: Callable[[Array], Array] | None = getattr(predictor, 'trust', None)
-    return of(X) if of else np.ones(X.shape[:-1])
+    return of(X) if of else 1.0
 
 
 @dataclass(frozen=True, eq=False)

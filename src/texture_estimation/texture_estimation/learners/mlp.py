@@ -188,10 +188,7 @@ class Mlp:
     extras: ClassVar[tuple[str, ...]] = ('augmented', 'parts')
 
     hidden: int = param(
-        128,
-        'Number of units in the hidden layer; more units separate finer and cost computing time.',
-        low=1,
-        high=4096,
+        128, 'Number of units in the hidden layer; more units separate finer and cost computing time.', low=1, high=4096
     )
     noise: float = param(
         0.3,
@@ -204,15 +201,10 @@ class Mlp:
     )
     epochs: int = param(60, 'Number of passes over the training examples.', low=1, high=100_000)
     folds: int = param(
-        5,
-        'Number of cross-validation folds for the calibration; more folds take longer to train.',
-        low=2,
-        high=50,
+        5, 'Number of cross-validation folds for the calibration; more folds take longer to train.', low=2, high=50
     )
     seed: int = param(
-        0,
-        'Seed of the initial weights, the order of the examples and the noise; equal seeds give equal models.',
-        low=0,
+        0, 'Seed of the initial weights, the order of the examples and the noise; equal seeds give equal models.', low=0
     )
 
     def fit(

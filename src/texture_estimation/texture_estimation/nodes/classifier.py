@@ -39,8 +39,7 @@ class EstimatorParams:
     """Parameters of the classifier and of the roughness estimator."""
 
     model: str = param(
-        '',
-        "Path of a trained model of its kind (NAME.npz or NAME.json); '': no model. It can be changed at any time.",
+        '', "Path of a trained model of its kind (NAME.npz or NAME.json); '': no model. It can be changed at any time."
     )
 
 
