@@ -303,7 +303,9 @@ def _draw_sweep(
     lines.set(ylim=(0, 105), xticks=places, xlim=(-0.5, len(rows) - 0.5))
     lines.tick_params(labelbottom=False)
     outcomes_of_rows = [numbers[OURS]['outcomes'][row] for _, row in rows]
-    accuracies = np.array([[end['accepted_correct'], end['accepted_wrong'], end['correct']] for end in outcomes_of_rows])
+    accuracies = np.array(
+        [[end['accepted_correct'], end['accepted_wrong'], end['correct']] for end in outcomes_of_rows]
+    )
     _draw_ends(strip, 100 * accuracies / np.array([[end['slides']] for end in outcomes_of_rows]))
     crowded = len(rows) > 6
     strip.set_xticks(places, ['none' if name == UNDISTURBED and not sweep.is_factor else f'{sweep.unit * strength:g}'
