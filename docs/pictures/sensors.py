@@ -58,7 +58,7 @@ def draw(sensor: str) -> None:
     found = channels(sensor, touch)
     title = f'Simulated {name} over {surface}, {1e3 * speed_m_s:g} mm/s, {force_n:g} N'
     path = Path(__file__).with_name(f'sensor_{sensor}.png')
-    with chart(path, (8.0, 6.6), title, points=11.0) as figure:
+    with chart(path, (5.8, 6.4), title, points=10.5) as figure:
         vibration, pressure, spectrum = figure.subplots(3, 1)
         colours = iter(COLOURS)
         for axes, names in ((vibration, fast), (pressure, slow)):
@@ -66,10 +66,8 @@ def draw(sensor: str) -> None:
                 values, rate_hz, unit = found[channel]
                 axes.plot(np.arange(len(values)) / rate_hz, values, linewidth=0.9, color=colour, label=channel)
             axes.axvspan(SLIDE_FROM_S, SLIDE_FROM_S + SLIDE_S, color='grey', alpha=0.15, linewidth=0)
-            axes.set(
-                xlim=(0, SLIDE_FROM_S + SLIDE_S + LIFT_S), ylabel=f'change ({unit})', xlabel='time (s); grey: slide'
-            )
-            axes.legend(loc='center left', bbox_to_anchor=(1.0, 0.5))
+            axes.set(xlim=(0, SLIDE_FROM_S + SLIDE_S + LIFT_S), ylabel=f'change ({unit})')
+        pressure.set_xlabel('time (s); grey: slide')
         for channel, colour in zip(fast, COLOURS, strict=False):
             values, rate_hz, unit = found[channel]
             sliding = values[int(SLIDE_FROM_S * rate_hz) : int((SLIDE_FROM_S + SLIDE_S) * rate_hz)]
@@ -80,7 +78,8 @@ def draw(sensor: str) -> None:
             passes_hz, color='black', linestyle='--', linewidth=1, zorder=0, label=f'{passes_hz:.0f} Hz: speed / pitch'
         )
         spectrum.set(xlabel='frequency (Hz)', ylabel=f'power ({unit}²/Hz)', xlim=(5, hz[-1]))
-        spectrum.legend(loc='center left', bbox_to_anchor=(1.0, 0.5))
+        for axes in (vibration, pressure, spectrum):
+            axes.legend(loc='lower right', bbox_to_anchor=(1.02, 0.98), ncols=4, columnspacing=1.0, handlelength=1.2)
 
 
 if __name__ == '__main__':

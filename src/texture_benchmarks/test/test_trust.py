@@ -102,8 +102,8 @@ def test_outcomes_are_counted_at_the_first_decided_estimate_and_at_the_end() -> 
 def test_the_quick_form_gives_figures_of_all_compared(tmp_path: Path, data: Path) -> None:
     numbers = run(BenchmarkOptions(tmp_path, data, quick=True)).numbers
     assert len(numbers['default']['outcomes']) == len(numbers['SVC on log bands']['outcomes']) == 1 + 8 + 4
-    assert numbers['default']['outcomes'][UNDISTURBED]['label_right'] > 12  # of 18
+    assert numbers['default']['outcomes'][UNDISTURBED]['correct'] > 12  # of 18
     for one in numbers['default']['outcomes'].values():
-        assert one['early_right'] + one['early_wrong'] <= one['slides'] == 18
+        assert one['early_correct'] + one['early_wrong'] <= one['slides'] == 18
         low, high = one['interval']
-        assert low <= one['label_right'] / one['slides'] <= high
+        assert low <= one['correct'] / one['slides'] <= high

@@ -124,7 +124,7 @@ def disturbed(item: LabelledSlide, row: DisturbanceSweep, strength: float, rng: 
 # --------------------
 # The study.
 
-OURS, PEER, PAPER = 'default', SVC, 'ets-fine-svm'  # of the papers, the one most often right here
+OURS, PEER, PAPER = 'default', SVC, 'ets-fine-svm'  # of the papers, the one with the highest accuracy here
 RECIPES = (OURS, 'vibration-and-taxels')
 COMPARED = (*RECIPES, PEER, PAPER)
 TRAINED_ON, TESTED_ON, DISTURBED = SELECTED = '1-30', '31-40', '32,35,38'
@@ -149,11 +149,11 @@ def outcome(results: Sequence[SlideResult]) -> dict[str, Any]:
     labels = [one.end.label == one.surface for one in results]
     return {
         'slides': len(results),
-        'early_right': sum(early),
+        'early_correct': sum(early),
         'early_wrong': len(early) - sum(early),
-        'final_right': sum(final),
-        'final_wrong': len(final) - sum(final),
-        'label_right': sum(labels),
+        'accepted_correct': sum(final),
+        'accepted_wrong': len(final) - sum(final),
+        'correct': sum(labels),
         'interval': accuracy_interval(labels, [one.surface for one in results]),
     }
 
@@ -165,7 +165,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Train on undisturbed slides, and test on later ones under disturbances, one at a time.
 
     Slides that are accepted and correct, rejected, or accepted but wrong, at the first decided estimate and at the
-    end, and slides whose label is right, accepted or not. Unknown: slides over materials that were not trained,
+    end, and slides whose label is correct, accepted or not. Unknown: slides over materials that were not trained,
     accepted all the same. The estimates have no information of the disturbance. 95 % intervals by bootstrap over
     surfaces, or exact over slides where these are wider.
     """
@@ -246,7 +246,7 @@ def ordered(sweep: DisturbanceSweep) -> list[tuple[float, str]]:
 # --------------------
 # The chart.
 
-RIGHT, UNKNOWN, WRONG = COLOURS[2], '#d9d9d9', COLOURS[5]
+CORRECT, REJECTED, WRONG = COLOURS[2], '#d9d9d9', COLOURS[5]
 LINES: Mapping[str, tuple[str, str, str]] = {
     OURS: (f'this suite: {OURS}', COLOURS[0], 'o'),
     PEER: (f'peer: {PEER}', COLOURS[3], 's'),
@@ -255,22 +255,23 @@ LINES: Mapping[str, tuple[str, str, str]] = {
 
 
 def failures_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
-    """Draw labels right of three methods under each disturbance, how ours ends, and unknown materials accepted."""
-    with chart(path, (8.0, 10.6), points=11.0) as figure:
-        heights = [1.0, 0.5] * 3
-        grid = figure.subplots(6, 3, height_ratios=heights, sharey='row')
-        panels = [(grid[2 * place, column], grid[2 * place + 1, column]) for place in range(3) for column in range(3)]
+    """Draw the accuracy of three methods under each disturbance, how ours ends, and unknown materials accepted."""
+    with chart(path, (6.0, 14.0), points=11.0) as figure:
+        grid = figure.subplots(10, 2, height_ratios=[1.0, 0.5] * 5, sharey='row')
+        panels = [*zip(grid[::2].flat, grid[1::2].flat, strict=True)]
+        for unused in panels.pop():
+            unused.axis('off')
         trained = trained_ranges(load_recipe(OURS).augmentation)
         for (lines, strip), (name, sweep) in zip(panels, ROWS.items(), strict=False):
             _draw_sweep(lines, strip, sweep, numbers, trained.get(name))
             lines.set_title(sweep.title)
         _draw_unknown(*panels[-1], numbers['unknown_materials'])
-        for lines, strip in zip(grid[::2, 0], grid[1::2, 0], strict=True):
-            lines.set_ylabel('label right (%)')
-            strip.set_ylabel('ends (%)')
+        for lines, strip in zip(grid[:8:2, 0], grid[1:8:2, 0], strict=True):
+            lines.set_ylabel('accuracy (%)')
+            strip.set_ylabel('slides (%)')
         handles, labels = grid[0, 0].get_legend_handles_labels()
         bars, names = grid[1, 0].get_legend_handles_labels()
-        figure.legend([*handles, *bars], [*labels, *names], loc='outside lower left', ncols=2)
+        figure.legend([*handles, *bars], [*labels, *names], loc='outside lower left')
     return Path(path)
 
 
@@ -295,14 +296,16 @@ def _draw_sweep(
         lines.axvspan(0, 0, color='#cfe3f2', linewidth=0)
     for name, (label, colour, marker) in LINES.items():
         ends = [numbers[name]['outcomes'][row] for _, row in rows]
-        accuracy = 100 * np.array([end['label_right'] / end['slides'] for end in ends])
+        accuracy = 100 * np.array([end['correct'] / end['slides'] for end in ends])
         low, high = 100 * np.array([end['interval'] for end in ends]).T
         lines.fill_between(places, low, high, color=colour, alpha=0.13, linewidth=0)
         lines.plot(places, accuracy, color=colour, marker=marker, markersize=4, label=label)
     lines.set(ylim=(0, 105), xticks=places, xlim=(-0.5, len(rows) - 0.5))
     lines.tick_params(labelbottom=False)
     outcomes_of_rows = [numbers[OURS]['outcomes'][row] for _, row in rows]
-    accuracies = np.array([[end['final_right'], end['final_wrong'], end['label_right']] for end in outcomes_of_rows])
+    accuracies = np.array(
+        [[end['accepted_correct'], end['accepted_wrong'], end['correct']] for end in outcomes_of_rows]
+    )
     _draw_ends(strip, 100 * accuracies / np.array([[end['slides']] for end in outcomes_of_rows]))
     crowded = len(rows) > 6
     strip.set_xticks(places, ['none' if name == UNDISTURBED and not sweep.is_factor else f'{sweep.unit * strength:g}'
@@ -317,16 +320,16 @@ def _draw_unknown(panel: Any, below: Any, unknown: Mapping[str, Mapping[str, Any
         panel.bar(place, accepted.mean(), 0.6, color=WRONG)
         panel.plot(np.full(len(accepted), place), accepted, '.', color='black')
     panel.set_xticks(range(len(unknown)), [name.replace('-and-', '-\nand-') for name in unknown])
-    panel.set_title('unknown materials accepted')
+    panel.set(title='unknown materials', ylabel='accepted (%)')
 
 
 def _draw_ends(strip: Any, accuracies: Array) -> None:
-    """Draw how the slides of ours end, (n, 3) in percent: accepted and correct, accepted but wrong, label right."""
+    """Draw how the slides of ours end, (n, 3) in percent: accepted and correct, accepted but wrong, correct."""
     places = np.arange(len(accuracies))
-    right, wrong, label = accuracies.T
-    strip.bar(places, right, 0.8, color=RIGHT, label=f'{OURS}: accepted and correct')
-    strip.bar(places, 100 - right - wrong, 0.8, right, color=UNKNOWN, label='rejected')
-    strip.bar(places, wrong, 0.8, 100 - wrong, color=WRONG, label='accepted but wrong')
-    strip.plot(places, label, 'D', color='black', markersize=4, label='label right, rejected or not')
+    correct, wrong, accuracy = accuracies.T
+    strip.bar(places, correct, 0.8, color=CORRECT, label=f'{OURS}: accepted and correct')
+    strip.bar(places, 100 - correct - wrong, 0.8, correct, color=REJECTED, label=f'{OURS}: rejected')
+    strip.bar(places, wrong, 0.8, 100 - wrong, color=WRONG, label=f'{OURS}: accepted but wrong')
+    strip.plot(places, accuracy, 'D', color='black', markersize=4, label=f'{OURS}: accuracy, accepted or not')
     strip.set(ylim=(0, 112), yticks=[0, 50, 100], xlim=(-0.5, len(places) - 0.5))
     strip.grid(visible=False)

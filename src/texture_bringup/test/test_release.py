@@ -50,6 +50,16 @@ def test_a_container_is_stopped_by_the_signal_on_which_launch_ends_its_nodes() -
     assert re.findall(r'^STOPSIGNAL (\w+)$', dockerfile, re.M) == ['SIGINT']
 
 
+def test_an_image_and_an_environment_of_conda_have_the_libraries_that_the_manifests_name() -> None:
+    manifests = [ElementTree.parse(package / 'package.xml') for package in PACKAGES]
+    keys = {depend.text for manifest in manifests for depend in manifest.iter('exec_depend')}
+    libraries = {key for key in keys if key.startswith('python3-')}
+    assert libraries <= set(re.findall(r'python3-\w+', (ROOT / 'docker' / 'Dockerfile').read_text()))
+    conda = {'serial': 'pyserial', 'sklearn': 'scikit-learn', 'yaml': 'pyyaml', 'matplotlib': 'matplotlib-base'}
+    named = {conda.get(name, name) for name in (key.removeprefix('python3-') for key in libraries)}
+    assert named <= set(re.findall(r'^([\w-]+) = ', (ROOT / 'pixi.toml').read_text(), re.M))
+
+
 def test_an_image_holds_only_what_is_let_through() -> None:
     ignored = (ROOT / 'docker' / 'Dockerfile.dockerignore').read_text().split('\n')
     let_through = {line[1:] for line in ignored if line.startswith('!')}

@@ -138,13 +138,13 @@ def figures_chart(
 ) -> Path:
     """Draw the figure of each method: the paper's as a cross, the simulated with its interval."""
     heights = [len(methods) + 1 for methods in panels.values()]
-    with chart(path, (7.0, 1.2 + 0.3 * sum(heights)), title) as figure:
+    with chart(path, (5.4, 1.2 + 0.26 * sum(heights)), title) as figure:
         rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
         for axes, (task, methods) in zip(rows, panels.items(), strict=True):
             _bars(axes, methods, drawn, unit[1])
             axes.set_title(task)
         rows[-1].set_xlabel(unit[0])
-        rows[0].legend(loc='lower right', bbox_to_anchor=(1.0, 1.0))
+        figure.legend(*rows[0].get_legend_handles_labels(), loc='outside lower left', ncols=2)
     return Path(path)
 
 
@@ -282,8 +282,6 @@ def charts_of(protocol: PaperProtocol, numbers: Mapping[str, Any], name: str, ou
         for method in task.methods:
             figures = numbers['tasks'][task.name][method.name]
             panels[task.name][method.name] = (method.paper.test, _interval(figures))
-            for part, cell in figures.get('sets', {}).items():
-                panels[task.name][f'{method.name}: {part}'] = (None, _interval(cell))
     path = out / f'experiment_{name.replace("-", "_")}.png'
     return figures_chart(panels, f'{name}: slides recognised, paper and simulation', path, drawn(numbers))
 
