@@ -301,7 +301,7 @@ def test_a_motor_with_a_latched_error_is_rebooted_by_a_service(make_world, tmp_p
     pytest.importorskip('dynamixel_sdk')
     with EmulatedDynamixelBus(tmp_path / 'bus', leap_hand()) as bus:
         bus.motors.fail(1, OVERLOAD)
-        world = make_world(arm='hand', hand='dynamixel', device=str(bus.port.link))
+        world = make_world(arm='hand', device=str(bus.port.link))
         response = world.explored(world.call(motion='in_hand_sliding'))
         assert "reboot it (service '~/reboot')" in response.message
         reboot = world.client.create_client(Trigger, 'explorer/reboot')

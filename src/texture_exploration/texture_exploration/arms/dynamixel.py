@@ -14,9 +14,7 @@ import sys
 import termios
 import threading
 import time
-from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import serial
@@ -458,8 +456,6 @@ CLOSING_M_S = 0.02  # speed of a finger that comes down to press
 REACH_RAD = 0.3  # largest depth of the goal of a pressing motor within the object
 SLACK_RAD = 0.2  # largest distance between the goal and a blocked motor
 LONGEST_STEP_S = 0.05
-RATE_CYCLES = 40  # over which the rate is measured
-SLOW_FRACTION = 0.7  # of the rate of the profile, below which a warning is given
 LIMITS = CommandLimits()
 NOT_CONNECTED = 'the hand is not connected; connect it first'
 
@@ -481,7 +477,7 @@ class DynamixelHand:
         self._fingers = {name: DynamixelFinger(joints, self.profile) for name, joints in self.profile.fingers.items()}
         self._state: HandState | None = None
         self._failure = NOT_CONNECTED
-        self._doubt = self._slow = ''
+        self._doubt = ''
         self._highest_a: Mapping[int, float] = {}
         self._grip: Mapping[str, float] = {}
         self._commands: dict[str, tuple[ArmCommand, float]] = {}
@@ -494,7 +490,7 @@ class DynamixelHand:
         self.close()
         self._closing.clear()
         self._fresh.clear()
-        self._failure = self._doubt = self._slow = ''
+        self._failure = self._doubt = ''
         self._thread = threading.Thread(target=self._run, name='dynamixel', daemon=True)
         self._thread.start()
         if not self._fresh.wait(FIRST_STATE_S) or self._failure:
@@ -519,7 +515,7 @@ class DynamixelHand:
 
     def warning(self) -> str:
         """Return what is not as it should be although the hand moves, '' if nothing."""
-        return '; '.join(filter(None, (self._doubt, self._slow)))
+        return self._doubt
 
     def grip(self, forces_n: Mapping[str, float]) -> None:
         """Press from the next cycle on."""
@@ -600,7 +596,6 @@ class DynamixelHand:
             finger.restart()
         now_s = stepped_s = time.monotonic()
         errors: dict[str, None] = {}
-        cycles: deque[float] = deque(maxlen=RATE_CYCLES)
         while not self._closing.wait(max(0.0, now_s + period_s - time.monotonic())):
             now_s = time.monotonic()
             motors = bus.read()
@@ -614,9 +609,6 @@ class DynamixelHand:
             stepped_s = now_s
             self._publish(self._fault(bus, errors))
             bus.write_goals(goals)
-            cycles.append(now_s)
-            if len(cycles) == RATE_CYCLES:
-                self._slow = self._slowness((RATE_CYCLES - 1) / (cycles[-1] - cycles[0]))
 
     def _doubtful(self, deaf: Iterable[int]) -> str:
         """Return a warning about motors whose watchdog may not stop them, '' if there are none."""
@@ -626,18 +618,6 @@ class DynamixelHand:
         return (
             f'the watchdog of motors {numbers} may not stop them when the cable is out or the computer hangs: their '
             'firmware is known to go on; update it with DYNAMIXEL Wizard'
-        )
-
-    def _slowness(self, rate_hz: float) -> str:
-        """Return a warning about the rate of the bus, '' if it is fast enough."""
-        if rate_hz >= SLOW_FRACTION * self.profile.rate_hz:
-            return ''
-        latency = Path(f'/sys/class/tty/{Path(self._device).resolve().name}/device/latency_timer')  # adapters by FTDI
-        now = f' (now {latency.read_text().strip()} ms)' if latency.is_file() else ''
-        return (
-            f'the bus makes {rate_hz:.0f} of {self.profile.rate_hz:g} cycles a second: set the latency timer of the '
-            f"USB adapter to 1 ms{now}, raise the baud rate ({self.profile.baud}) or lower 'rate_hz' of the profile "
-            f"'{self.profile.name}'"
         )
 
     def _step(self, motors: Mapping[int, MotorState], dt_s: float, now_s: float) -> dict[int, tuple[float, float]]:
