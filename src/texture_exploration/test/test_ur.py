@@ -28,7 +28,7 @@ from texture_core.types import ExplorationRequest, FingerReceiver, Phase
 from texture_exploration.arms import ur
 from texture_exploration.arms.arm import ArmCommand
 from texture_exploration.arms.ur import UrArm, UrArmParams
-from texture_exploration.exploration import Exploration
+from texture_exploration.exploration import Exploration, arm_fault
 from texture_exploration.explorer import Explorer, Pacer
 from texture_exploration.motions import MOTIONS
 from texture_exploration.safety import SafetyLimits
@@ -198,7 +198,7 @@ def dashboard(answers):
 def test_it_touches_holds_2_newtons_slides_50_mm_at_20_mm_s_and_lifts(emulator, record_property):
     phases = []
     explorer = Explorer(
-        UrArm(UrArmParams(ip=emulator.ip, silence_s=1.0)),
+        UrArm(UrArmParams(ip=emulator.ip)),
         TouchParams(peak_speed_fraction=3.4),  # emulated, it makes up for up to 0.1 s; the speed is measured below
         SafetyLimits(state_timeout_s=1.0),  # a busy machine may hold the process up; silence is tested below
         lambda state: phases.append((state.stamp_ns, state.phase)),
@@ -276,20 +276,14 @@ def test_connecting_releases_no_protective_stop(arm, emulator):
     wait_for(lambda: 'releasing' in emulator.controller.ask('unlock protective stop'))  # as a person at the pendant
 
 
-def test_a_frozen_controller_is_a_fault_within_150_ms_and_stops_when_it_thaws(arm, emulator, record_property):
+def test_the_state_of_a_frozen_controller_becomes_old_and_its_arm_stops_when_it_thaws(arm, emulator):
     keep(arm, SLIDING, emulator.moves)
     try:
-        with Ticker() as ticker:
-            emulator.controller.freeze()
-            last_ns = emulator.fingers[-1].time_ns
-            keep(arm, SLIDING, lambda: faulty(arm))
-            silent_s = (time.monotonic_ns() - last_ns) * 1e-9
-        record_property('detected_s', silent_s)
-        assert 'silent' in faulty(arm)
-        assert 0.1 <= silent_s < 0.15 + ticker.worst_s
+        emulator.controller.freeze()
+        keep(arm, SLIDING, lambda: 'has not answered' in arm_fault(arm.state(), time.monotonic_ns(), SafetyLimits()))
     finally:
         emulator.controller.resume()
-    wait_for(lambda: faulty(arm) == '' and emulator.rests())
+    wait_for(lambda: arm_fault(arm.state(), time.monotonic_ns(), SafetyLimits()) == '' and emulator.rests())
     keep(arm, SLIDING, emulator.moves)
 
 
@@ -458,7 +452,7 @@ def test_after_a_protective_stop_in_contact_the_same_force_is_pressed_again():
 
 def test_after_a_recovery_the_arm_stands_still_until_it_is_reported_to_move():
     """Commands hold for 2 s here: one of before, in the worker or in a register of the controller, would be obeyed."""
-    with bench_at('127.0.0.84') as emulator, connected(emulator.ip, command_timeout_s=2.0, silence_s=1.0) as arm:
+    with bench_at('127.0.0.84') as emulator, connected(emulator.ip, command_timeout_s=2.0) as arm:
         keep(arm, SLIDING, emulator.moves)
         emulator.controller.ask('emulate protective stop')
         keep(arm, SLIDING, lambda: arm.state().fault == 'protective stop')
@@ -537,7 +531,7 @@ DEAFNESS = {
 def test_an_approach_that_hears_nothing_from_the_contact_on_presses_little_harder_than_asked(what, late_s):
     """Asked: 1.5 times the wanted force; a busy machine may hold the emulated watchdog up for another 0.1 s."""
     with bench_at('127.0.0.83', surface_z_m=0.1 + ABOVE_PLANE_M) as emulator:
-        arm = UrArm(UrArmParams(ip=emulator.ip, silence_s=1.0))
+        arm = UrArm(UrArmParams(ip=emulator.ip))
         explorer = Explorer(arm, TouchParams(), SafetyLimits(state_timeout_s=1.0), lambda state: None)
         explorer.connect()
         try:
@@ -631,7 +625,7 @@ def test_a_wall_in_the_slide_and_on_the_way_to_the_start_is_met_gently_and_left_
     touch, limits = TouchParams(), SafetyLimits(state_timeout_s=2.0)
     felt, done = [], threading.Event()
     # The controller's own protective stop is not what is tested here.
-    with bench_at(ip, wall_m=0.02, stop_force_n=1e5) as emulator, connected(ip, silence_s=1.0) as arm:
+    with bench_at(ip, wall_m=0.02, stop_force_n=1e5) as emulator, connected(ip) as arm:
 
         def feel():
             while not done.is_set():

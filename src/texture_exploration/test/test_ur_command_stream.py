@@ -100,7 +100,7 @@ class SteppedLink:
     def report(self):
         robot, stream = self.robot, self.stream
         measured = (tuple(vector[:3].tolist()) for vector in (robot.pose, robot.velocity, robot.force))
-        return UrReport(self.now_ns, *measured, 0.1, 1, True, False, stream.trusted, {})
+        return UrReport(self.now_ns, *measured, 0.1, 1, True, stream.trusted, {})
 
     def check(self):
         pass

@@ -74,7 +74,6 @@ class UrReport(NamedTuple):
     watchdog_s: float
     safety_mode: int
     playing: bool
-    silent: bool
     zeroed: bool
     counts: Mapping[str, int]
 
@@ -103,9 +102,6 @@ class UrArmParams(ZeroingParams, SurfacePoseParams, CommandLimits):
     )
     watchdog_hz: float = param(
         10.0, 'Rate of commands below which the controller stops the arm.', unit='Hz', low=1.0, high=50.0
-    )
-    silence_s: float = param(
-        0.1, 'How long the controller may send no state before that is a fault.', unit='s', low=0.02, high=2.0
     )
     connect_timeout_s: float = param(
         10.0, 'How long the arm may take to be ready before connecting fails.', unit='s', low=0.5, high=60.0
@@ -561,8 +557,6 @@ class UrArm(SurfaceArm):
         return link.report
 
     def _fault(self, report: UrReport) -> str:
-        if report.silent:
-            return f'the controller is silent for more than {self._params.silence_s * 1e3:.0f} ms'
         if report.safety_mode in SAFETY_FAULTS:
             return SAFETY_FAULTS[report.safety_mode]
         return '' if report.playing else 'its control program was stopped, by hand or by its watchdog'

@@ -275,6 +275,7 @@ def _mode(ur_command: UrCommand | None) -> Mode:
 
 VARIABLES = ['timestamp', 'actual_TCP_pose', 'actual_TCP_speed', 'actual_TCP_force', 'safety_mode', 'runtime_state']
 HANGING_S = 2.0  # no command takes longer
+SILENT_S = 0.1  # without a state of the controller, after which it gets no more commands
 RESTART_S = 5.0  # of the program on the controller
 LATE_S = 0.02
 OTHER_PROGRAM = (
@@ -300,10 +301,8 @@ class Observer:
         self.newest: UrReport | None = None
         self._receive = receive
         self._channel = channel
-        self._silence_s = params.silence_s
         self._period_s = 1.0 / RATE_HZ
         self._stamp = -1.0
-        self._time_ns = time.monotonic_ns()
         self._silent_for_s = 0.0
 
     def run(self) -> None:
@@ -320,27 +319,22 @@ class Observer:
 
     def _poll(self, passed_s: float) -> None:
         stamp = self._receive.getTimestamp()
-        if stamp != self._stamp:
-            self._stamp, self._time_ns = stamp, time.monotonic_ns()
-            self._silent_for_s, self.silent = 0.0, False
-            self._report()
-            return
         self._silent_for_s += passed_s
-        if self._silent_for_s > self._silence_s and not self.silent:
-            self.silent = True
+        if stamp != self._stamp:
+            self._stamp, self._silent_for_s = stamp, 0.0
             self._report()
+        self.silent = self._silent_for_s > SILENT_S
 
     def _report(self) -> None:
         receive = self._receive
         report = UrReport(
-            time_ns=self._time_ns,
+            time_ns=time.monotonic_ns(),
             position_m=_vector(receive.getActualTCPPose()),
             velocity_m_s=_vector(receive.getActualTCPSpeed()),
             force_n=_vector(receive.getActualTCPForce()),
             watchdog_s=self.watchdog_s,
             safety_mode=receive.getSafetyMode(),
             playing=receive.getRuntimeState() == PROGRAM_PLAYING,
-            silent=self.silent,
             zeroed=self.zeroed,
             counts=self.counts,
         )
