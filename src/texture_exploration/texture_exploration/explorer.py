@@ -156,7 +156,7 @@ class Explorer:
         return True
 
     def recover(self) -> None:
-        """Free the arm from a fault, by its recovery or by connecting again; the caller makes sure that it may move.
+        """Free the arm from a fault by connecting again; the caller makes sure that it may move.
 
         The next exploration lifts first, as the finger may still press.
         """
@@ -166,7 +166,6 @@ class Explorer:
             if self.fault():
                 with contextlib.suppress(DeviceError):  # connecting again also reports it
                     self.arm.recover()
-            if self.fault():
                 self.connect()
 
     def lift(self) -> float:

