@@ -15,7 +15,7 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -85,6 +85,26 @@ class ArmCommand:
 
 
 STANDSTILL = ArmCommand()
+
+# Of a single command from any program; the explorer has tighter limits for requests.
+MOST_COMMAND_M_S = 1.0  # along the surface: four times the limit of an exploration
+MOST_NORMAL_COMMAND_M_S = 0.5
+MOST_COMMAND_N = 50.0  # the limit of an exploration is not higher
+
+
+def check_command(command: ArmCommand, stop: Callable[[], object]) -> None:
+    """Stop the arm and raise CommandRefused if a command is out of range."""
+    for what, value, low, high, unit in (
+        ('the speed along the surface', math.hypot(*command.tangential_m_s), 0.0, MOST_COMMAND_M_S, 'm/s'),
+        ('the speed along the normal', command.normal_m_s, -MOST_NORMAL_COMMAND_M_S, MOST_NORMAL_COMMAND_M_S, 'm/s'),
+        ('the force', 0.0 if command.force_n is None else command.force_n, 0.0, MOST_COMMAND_N, 'N'),
+    ):
+        if not low <= value <= high:  # so is NaN
+            stop()
+            raise CommandRefused(
+                f'the command was refused and the arm stopped: {what} is {value:g} {unit}; allowed is {low:g} to '
+                f'{high:g} {unit}'
+            )
 
 
 class Arm:
@@ -257,7 +277,7 @@ class SurfaceArm(Arm):
 
     def _check(self, command: ArmCommand) -> None:
         """Refuse a command that is out of range, or has a force before the force sensor is zeroed; the arm stops."""
-        self._params.check(command, self.stop)
+        check_command(command, self.stop)
         if command.force_n is not None and not self.zeroed and not self.state().fault:
             self.stop()
             raise CommandRefused(
@@ -313,20 +333,27 @@ def claim(resource: str, patience_s: float) -> int:
         raise DeviceError(
             f"the lock '{path}' of the arm cannot be opened ({error}); see that the folder exists"
         ) from error
+    try:
+        lock_within(lock, patience_s)
+    except BlockingIOError as error:
+        raise DeviceError(
+            f'another process on this machine commands the arm ({resource}), or its guard still stops it: '
+            f"it holds '{path}', and fuser names the process; end it first"
+        ) from error
+    return lock
+
+
+def lock_within(descriptor: int, patience_s: float) -> None:
+    """Lock an open file; if another process holds it for longer, close it and raise BlockingIOError."""
     end_s = time.monotonic() + patience_s
     while True:
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            if time.monotonic() < end_s and not ENDING.is_set():
-                time.sleep(0.02)
-                continue
-            os.close(lock)
-            raise DeviceError(
-                f'another process on this machine commands the arm ({resource}), or its guard still stops it: '
-                f"it holds '{path}', and fuser names the process; end it first"
-            ) from error
-        return lock
+            return fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if time.monotonic() > end_s or ENDING.is_set():
+                os.close(descriptor)
+                raise
+        time.sleep(0.02)
 
 
 class GuardProcess:

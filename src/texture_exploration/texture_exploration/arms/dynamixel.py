@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import functools
 import importlib
 import math
@@ -20,7 +19,15 @@ from typing import Any, NamedTuple
 import serial
 
 from texture_core.errors import CommandRefused, DeviceError
-from texture_exploration.arms.arm import DONE, STANDSTILL, ArmCommand, GuardProcess, guard_socket
+from texture_exploration.arms.arm import (
+    DONE,
+    STANDSTILL,
+    ArmCommand,
+    GuardProcess,
+    check_command,
+    guard_socket,
+    lock_within,
+)
 from texture_exploration.arms.hand import (
     POSITION_RAD,
     VELOCITY_RAD_S,
@@ -35,7 +42,6 @@ from texture_exploration.arms.hand import (
     goes_on,
     load_profile,
 )
-from texture_exploration.safety import CommandLimits
 
 # --------------------
 # Motors on a Dynamixel bus, in physical units, through the unmodified dynamixel-sdk.
@@ -58,6 +64,7 @@ OPERATING_MODE = 5  # current-based position: in any other the current does not 
 FIRMWARE = 6  # address of its version, of one byte, in all control tables of protocol 2.0
 TRIPPED = 0xFF  # the register of the Bus Watchdog after it has stopped the motor
 RESTART_S = 3.0  # a motor has rebooted within
+LOCKED_S = 1.0  # the guard of a killed process has released the motors within
 SILENT = 'does not answer'
 GARBLED = 'answers with data that cannot be read: do two motors have this id, or is the cable damaged?'
 RESET = 'has lost its torque: it was reset, for example by a voltage drop'
@@ -71,21 +78,6 @@ class MotorState(NamedTuple):
     current_a: float
     velocity_rad_s: float
     position_rad: float
-
-
-def _locked(device: str) -> int:
-    """Return a descriptor that holds a lock on a device; OSError if another program has it.
-
-    Two programs on one bus would read each other's answers and release each other's motors. The SDK empties the input
-    buffer when it opens the port, with answers to another program; so the lock is taken before.
-    """
-    descriptor = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        os.close(descriptor)
-        raise
-    return descriptor
 
 
 class DynamixelBus:
@@ -111,7 +103,11 @@ class DynamixelBus:
         self._port: Any = self._sdk.PortHandler(device)
         self._packets: Any = self._sdk.PacketHandler(PROTOCOL)
         with self._line(), contextlib.ExitStack() as on_error:
-            self.lock = _locked(device)
+            # Two programs on one bus would read each other's answers and release each other's motors. The SDK empties
+            # the input buffer when it opens the port, with answers to another program; so the lock is taken before.
+            lock = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+            lock_within(lock, LOCKED_S)
+            self.lock = lock
             on_error.callback(self.close)
             opened = self._port.openPort() and self._port.setBaudRate(profile.baud)
             if opened:
@@ -456,7 +452,6 @@ CLOSING_M_S = 0.02  # speed of a finger that comes down to press
 REACH_RAD = 0.3  # largest depth of the goal of a pressing motor within the object
 SLACK_RAD = 0.2  # largest distance between the goal and a blocked motor
 LONGEST_STEP_S = 0.05
-LIMITS = CommandLimits()
 NOT_CONNECTED = 'the hand is not connected; connect it first'
 
 
@@ -469,11 +464,10 @@ class DynamixelHand:
     motors stops them.
     """
 
-    def __init__(self, profile: str, device: str, limits: CommandLimits = LIMITS) -> None:
+    def __init__(self, profile: str, device: str) -> None:
         self.profile: Profile = load_profile(profile)
         self.finger_sets: Mapping[str, FingerSet] = self.profile.finger_sets
         self._device = device
-        self._limits = limits
         self._fingers = {name: DynamixelFinger(joints, self.profile) for name, joints in self.profile.fingers.items()}
         self._state: HandState | None = None
         self._failure = NOT_CONNECTED
@@ -550,7 +544,7 @@ class DynamixelHand:
 
     def _check(self, name: str, command: ArmCommand) -> None:
         """Refuse a command beyond its limits or beyond the current of the motor."""
-        self._limits.check(command, lambda: self._command_motors([name], STANDSTILL))
+        check_command(command, lambda: self._command_motors([name], STANDSTILL))
         highest_n = self._highest_n(name)
         if command.force_n is not None and command.force_n > highest_n:
             self._command_motors([name], STANDSTILL)

@@ -14,7 +14,6 @@ from texture_core.types import DEVICES
 from texture_exploration.arms.arm import Arm, ArmCommand, ArmState, Vector
 from texture_exploration.arms.dynamixel import DynamixelHand
 from texture_exploration.arms.hand import FingerSet, Fingertip
-from texture_exploration.safety import CommandLimits
 
 HELD_FRACTION = 0.8  # of the wanted force: a finger that presses with it holds the object
 LOST_FRACTION = 0.5  # one that presses less has lost it
@@ -22,7 +21,7 @@ SAMPLE_PERIOD_S = 0.01
 
 
 @dataclass(frozen=True)
-class InHandParams(CommandLimits):
+class InHandParams:
     """Parameters of the hand and of its grip."""
 
     finger_set: str = param('kaboli-train', 'Finger set of the hand: which fingers hold and which slide.')
@@ -46,7 +45,7 @@ class InHandArm(Arm):
 
     def __init__(self, params: InHandParams = InHandParams()) -> None:
         self._params = params
-        self.hand = DynamixelHand(params.profile, params.device, params)
+        self.hand = DynamixelHand(params.profile, params.device)
         self.fingers: FingerSet = find(self.hand.finger_sets, params.finger_set, 'finger set')
 
     def connect(self) -> None:

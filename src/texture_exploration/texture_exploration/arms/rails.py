@@ -19,8 +19,7 @@ from texture_core.config import param
 from texture_core.errors import DeviceError
 from texture_core.framing import Frame, FrameDecoder, pack
 from texture_core.types import DEVICES
-from texture_exploration.arms.arm import Arm, ArmCommand, ArmState, Vector
-from texture_exploration.safety import CommandLimits
+from texture_exploration.arms.arm import Arm, ArmCommand, ArmState, Vector, check_command
 
 # --------------------
 # Numbers of the rails and of the line to their microcontroller: the machine of Hu et al. 2014, frames of this project.
@@ -64,7 +63,7 @@ READ_S = 0.05
 
 
 @dataclass(frozen=True)
-class RailsParams(CommandLimits):
+class RailsParams:
     """Device of the rails, and the scale of their encoders."""
 
     device: str = param(f'{DEVICES}/rails', 'Path of the serial device of the rails; the default is the emulated one.')
@@ -156,7 +155,7 @@ class RailsArm(Arm):
 
     def command(self, command: ArmCommand) -> None:
         """Send a command."""
-        self._params.check(command, self.stop)
+        check_command(command, self.stop)
         vx, vy = (round(speed * MICRO) for speed in command.tangential_m_s)
         mode, value = MOVING, round(command.normal_m_s * MICRO)
         if command.force_n is not None:

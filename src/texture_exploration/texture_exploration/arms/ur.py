@@ -16,8 +16,8 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Mapping
-from contextlib import closing
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -36,7 +36,6 @@ from texture_exploration.arms.arm import (
     give_up_when_ending,
     tangential_force_n,
 )
-from texture_exploration.safety import CommandLimits
 
 # --------------------
 # Messages between the arm and its worker process: datagrams of JSON on a socket pair. To the worker goes a command, or
@@ -83,7 +82,7 @@ class UrReport(NamedTuple):
 
 
 @dataclass(frozen=True)
-class UrArmParams(ZeroingParams, SurfacePoseParams, CommandLimits):
+class UrArmParams(ZeroingParams, SurfacePoseParams):
     """Address of the controller, pose of the surface, and supervision of the arm."""
 
     ip: str = param('127.0.0.2', 'IP address of the controller; the default, and a path, are of the emulated one.')
@@ -234,60 +233,52 @@ UNLOCK_WAIT_S = 8.0  # the controller refuses for 5 s
 UNLOCK_RETRY_S = 0.25
 
 
-class DashboardClient:
-    """The dashboard server of a controller: one line per request, one line per answer, all within a time limit."""
+@contextmanager
+def dashboard(ip: str) -> Iterator[Callable[[str], str]]:
+    """Ask the dashboard server of a controller: one line per request, one line per answer, all within `PROBE_S`."""
+    where, end_s = f'{ip}:{DASHBOARD_PORT}', time.monotonic() + PROBE_S
+    try:
+        connection = socket.create_connection((ip, DASHBOARD_PORT), PROBE_S)
+    except OSError as error:
+        if not isinstance(error, ConnectionRefusedError):
+            what = "is the controller on, and is parameter 'ip' its address?"
+            raise DeviceError(f'{where} cannot be reached: {error}; {what}') from error
+        raise DeviceError(
+            f"nothing listens on {where}; is the controller on, and is parameter 'ip' its address? For "
+            "PolyScope X, which has no dashboard, use the arm 'ros_controllers' with ur_robot_driver"
+        ) from error
 
-    def __init__(self, ip: str, timeout_s: float) -> None:
-        self._where = f'{ip}:{DASHBOARD_PORT}'
-        self._timeout_s = timeout_s
-        self._end_s = time.monotonic() + timeout_s
-        try:
-            self._socket = socket.create_connection((ip, DASHBOARD_PORT), timeout_s)
-        except OSError as error:
-            if not isinstance(error, ConnectionRefusedError):
-                what = "is the controller on, and is parameter 'ip' its address?"
-                raise DeviceError(f'{self._where} cannot be reached: {error}; {what}') from error
-            raise DeviceError(
-                f"nothing listens on {self._where}; is the controller on, and is parameter 'ip' its address? For "
-                "PolyScope X, which has no dashboard, use the arm 'ros_controllers' with ur_robot_driver"
-            ) from error
-        self._read_line()  # its greeting
-
-    def close(self) -> None:
-        """Close the connection."""
-        self._socket.close()
-
-    def ask(self, line: str) -> str:
-        """Return the answer to a command."""
-        with contextlib.suppress(OSError):  # reading names what is wrong
-            self._socket.sendall(line.encode() + b'\n')
-        return self._read_line()
-
-    def _read_line(self) -> str:
+    def ask(request: str) -> str:
         line = b''
-        while not line.endswith(b'\n'):
-            self._socket.settimeout(max(0.001, self._end_s - time.monotonic()))
-            with contextlib.suppress(OSError):
-                if byte := self._socket.recv(1):
-                    line += byte
-                    continue
+        with contextlib.suppress(OSError):
+            connection.sendall(request.encode())
+            while not line.endswith(b'\n'):
+                connection.settimeout(max(0.001, end_s - time.monotonic()))
+                if not (byte := connection.recv(1)):
+                    break
+                line += byte
+        if not line.endswith(b'\n'):
             raise DeviceError(
-                f'{self._where} takes connections but does not answer as a UR controller within {self._timeout_s:g} s; '
+                f'{where} takes connections but does not answer as a UR controller within {PROBE_S:g} s; '
                 "wait until it has started, restart it, or correct parameter 'ip'"
             )
         return line.decode('utf-8', 'replace').strip()
 
+    with connection:
+        ask('')  # its greeting
+        yield lambda request: ask(request + '\n')
 
-def check_ready(ip: str, timeout_s: float) -> tuple[int, int]:
+
+def check_ready(ip: str) -> tuple[int, int]:
     """Return the version of a controller whose arm can move."""
-    with closing(DashboardClient(ip, timeout_s)) as dashboard:
-        version = _checked_version(ip, dashboard.ask('PolyscopeVersion'))
-        mode = dashboard.ask('robotmode')
+    with dashboard(ip) as ask:
+        version = _checked_version(ip, ask('PolyscopeVersion'))
+        mode = ask('robotmode')
         if 'RUNNING' not in mode:
             raise DeviceError(f"the arm at {ip} answers '{mode}'; switch it on and release its brakes")
-        if version >= FIRST_WITH_REMOTE_CONTROL and 'true' not in dashboard.ask('is in remote control'):
+        if version >= FIRST_WITH_REMOTE_CONTROL and 'true' not in ask('is in remote control'):
             raise DeviceError(f'the arm at {ip} is under local control; switch the pendant to remote control')
-        safety = _safety(dashboard)
+        safety = _safety(ask)
     if safety not in FREE_MODES:
         raise DeviceError(
             f'the arm at {ip} is held by its safety system ({safety}); find the cause, release it on the '
@@ -313,22 +304,22 @@ def _checked_version(ip: str, answer: str) -> tuple[int, int]:
     return version
 
 
-def unlock_protective_stop(ip: str, timeout_s: float) -> None:
+def unlock_protective_stop(ip: str) -> None:
     """Release a protective stop, as soon as the controller allows it."""
     end_s = time.monotonic() + UNLOCK_WAIT_S
     while True:
-        with closing(DashboardClient(ip, timeout_s)) as dashboard:
-            if _safety(dashboard) in FREE_MODES:
+        with dashboard(ip) as ask:
+            if _safety(ask) in FREE_MODES:
                 return
-            answer = dashboard.ask('unlock protective stop')
+            answer = ask('unlock protective stop')
         if time.monotonic() > end_s:
             raise DeviceError(f"the controller at {ip} does not release the protective stop: '{answer}'")
         time.sleep(UNLOCK_RETRY_S)
 
 
-def _safety(dashboard: DashboardClient) -> str:
+def _safety(ask: Callable[[str], str]) -> str:
     """Return the safety mode, such as NORMAL."""
-    return dashboard.ask('safetymode').rpartition(' ')[2]
+    return ask('safetymode').rpartition(' ')[2]
 
 
 # --------------------
@@ -345,11 +336,11 @@ def check_program(params: UrArmParams, *, pause_is_ours: bool) -> None:
     A stop by the safety system may pause the program of the connection before: `pause_is_ours`, and is stopped. A
     control script of ours whose process was killed is ended by its watchdog.
     """
-    ip, timeout_s = params.ip, PROBE_S
+    ip = params.ip
     end_s = time.monotonic() + max(ACKNOWLEDGE_S, 1.0 / params.watchdog_hz) + WATCHDOG_S
-    while program := _program(ip, timeout_s):
+    while program := _program(ip):
         if pause_is_ours and program.upper().startswith('PAUSED'):
-            _stop(ip, timeout_s)
+            _stop(ip)
             return
         if time.monotonic() > end_s:
             raise DeviceError(
@@ -359,19 +350,19 @@ def check_program(params: UrArmParams, *, pause_is_ours: bool) -> None:
         time.sleep(SAMPLE_PERIOD_S)
 
 
-def _program(ip: str, timeout_s: float) -> str:
+def _program(ip: str) -> str:
     """Return the program that runs or pauses, as the controller reports it; '' if there is none."""
-    with closing(DashboardClient(ip, timeout_s)) as dashboard:
-        running, state = dashboard.ask('running'), dashboard.ask('programState')
+    with dashboard(ip) as ask:
+        running, state = ask('running'), ask('programState')
     return state if 'true' in running.lower() or not state.upper().startswith('STOPPED') else ''
 
 
-def _stop(ip: str, timeout_s: float) -> None:
+def _stop(ip: str) -> None:
     """Stop it."""
-    with closing(DashboardClient(ip, timeout_s)) as dashboard:
-        dashboard.ask('stop')
+    with dashboard(ip) as ask:
+        ask('stop')
     end_s = time.monotonic() + UR_PROGRAM_STOPPING_S
-    while program := _program(ip, timeout_s):
+    while program := _program(ip):
         if time.monotonic() > end_s:
             raise DeviceError(
                 f"the program on the controller at {ip} ('{program}') does not stop; stop it on the pendant"
@@ -411,7 +402,7 @@ class UrArm(SurfaceArm):
         DeviceError
             If it cannot be reached, or its arm cannot move.
         """
-        check_ready(self._params.ip, PROBE_S)
+        check_ready(self._params.ip)
 
     def connect(self) -> None:
         """Reach the controller and start its control program.
@@ -430,7 +421,7 @@ class UrArm(SurfaceArm):
         params = self._params
         try:
             self._lock = claim(f'ur {params.ip}', UR_LINK_STOPPING_S + ACKNOWLEDGEMENTS * ACKNOWLEDGE_S)
-            version = check_ready(params.ip, PROBE_S)
+            version = check_ready(params.ip)
             check_program(params, pause_is_ours=self._paused)
             self._link, self._series = WorkerLink(params, self._lock), version[0]
             self._link.wait_for_report()
@@ -508,7 +499,7 @@ class UrArm(SurfaceArm):
             If the controller does not allow it.
         """
         self.close()
-        unlock_protective_stop(self._params.ip, PROBE_S)
+        unlock_protective_stop(self._params.ip)
 
     @property
     def base_frame_id(self) -> str:
