@@ -7,7 +7,6 @@ import pytest
 from texture_core.errors import DeviceError, ExplorationError, MotionRefused
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.simulated import SimulatedArm
-from texture_exploration.arms.ur import UrArm
 from texture_exploration.explorer import Explorer
 from texture_exploration.safety import SafetyLimits, SurfacePatch
 from texture_exploration.touch import TouchParams
@@ -130,7 +129,6 @@ def test_an_arm_that_cannot_be_reached_refuses_in_a_sentence():
     with pytest.raises(MotionRefused, match='the arm is not ready: the arm does not answer'):
         explorer.begin('one', QUICK)
     assert explorer.fault() == 'not connected'
-    assert Explorer(UrArm(), TouchParams(), SafetyLimits(), lambda state: None).arm_counts() == {}
 
 
 PATCH = SurfacePatch(-0.03, 0.05, -0.02, 0.02)

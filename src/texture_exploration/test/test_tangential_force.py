@@ -44,7 +44,7 @@ class Link:
 def test_the_ur_arm_reports_it_in_the_frame_of_a_tilted_surface(monkeypatch):
     axes = rotation_matrix((0.2, -0.4, 0.0))
     velocity, force = axes @ np.array([0.03, 0.04, 0.0]), axes @ np.array([-0.36, -0.48, 2.0])  # 0.3 of 2 N
-    report = UrReport(1, (0.4, 0.0, 0.1), tuple(velocity), tuple(force), 0.1, 1, True, True, {})
+    report = UrReport(1, (0.4, 0.0, 0.1), tuple(velocity), tuple(force), 0.1, 1, True, True)
     arm = UrArm(UrArmParams(surface_rx_rad=0.2, surface_ry_rad=-0.4))
     monkeypatch.setattr(arm, '_link', Link(report))
     state = arm.state()

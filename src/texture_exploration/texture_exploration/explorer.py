@@ -9,7 +9,7 @@ import math
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict
 
 from texture_core.config import find, place_of
@@ -104,12 +104,6 @@ class Explorer:
             return (self.clock() - self.arm.state().time_ns) * 1e-9
         except DeviceError:
             return math.nan
-
-    def arm_counts(self) -> Mapping[str, int]:
-        """Return the totals of the arm, none if it has none or cannot be reached."""
-        with contextlib.suppress(DeviceError):
-            return self.arm.counts
-        return {}
 
     def fault(self) -> str:
         """Return in a sentence why the arm cannot move now, '' if it can."""

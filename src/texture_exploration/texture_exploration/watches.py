@@ -7,7 +7,6 @@ from __future__ import annotations
 import math
 import statistics
 from collections import deque
-from collections.abc import Iterator
 from dataclasses import replace
 
 from texture_core.errors import ExplorationError, MotionAborted
@@ -163,20 +162,18 @@ class SlideWatch:
 
     def flaw(self) -> str:
         """Return in a sentence the request and the measurement if they differ too much, '' if not."""
-        return '; '.join(self._differences())
-
-    def _differences(self) -> Iterator[str]:
+        flaws: list[str] = []
         touch, asked_n, asked_m_s = self._touch, self._force_n, self._speed_m_s
         mean_n = self._force_sum_n / max(1, self._states)
         if not abs(mean_n - asked_n) <= self._mean_force_fraction * asked_n:  # so NaN is none
-            yield (
+            flaws.append(
                 f'the mean force of the slide was {mean_n:.2f} N, more than {self._mean_force_fraction:.0%} off the '
                 f'{asked_n:g} N requested; slide more slowly, or check the force '
                 'control of the arm'
             )
         mean_m_s = self._way_m / self._way_s if self._way_s else asked_m_s
         if not abs(mean_m_s - asked_m_s) <= touch.mean_speed_fraction * asked_m_s:
-            yield (
+            flaws.append(
                 f'the mean speed of the slide was {mean_m_s:.4f} m/s, more than {touch.mean_speed_fraction:.0%} off '
                 f"the {asked_m_s:g} m/s requested ('mean_speed_fraction'); check what scales the speed of the "
                 'arm'
@@ -187,10 +184,11 @@ class SlideWatch:
         )
         for (what, unit, asked, parameter), peak, most in zip(measured, self._peaks, self._most, strict=True):
             if not peak <= most:
-                yield (
+                flaws.append(
                     f'the {what} of the slide reached {peak:.3g} {unit}, and {most:.3g} {unit} are allowed with '
                     f"{asked:g} {unit} requested ('{parameter}')"
                 )
+        return '; '.join(flaws)
 
     def _add_way(self, arm: ArmState) -> None:
         """Sum the distance in pieces of PEAK_NS: noise of the position makes shorter ones too long."""

@@ -15,7 +15,7 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -166,11 +166,6 @@ class Arm:
     def zeroed(self) -> bool:
         """Whether the force is a measure of contact: not before an arm that zeroes its sensor itself has done so."""
         return True
-
-    @property
-    def counts(self) -> Mapping[str, int]:
-        """Totals for the operator, by name; DeviceError if the arm is not connected."""
-        return {}
 
     @property
     def base_frame_id(self) -> str:

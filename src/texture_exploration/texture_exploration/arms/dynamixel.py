@@ -30,6 +30,7 @@ from texture_exploration.arms.arm import (
 )
 from texture_exploration.arms.hand import (
     POSITION_RAD,
+    ROLES,
     VELOCITY_RAD_S,
     X_SERIES,
     ZERO,
@@ -665,9 +666,13 @@ class DynamixelFinger:
     @property
     def tip(self) -> Fingertip:
         """Place, speed and force."""
-        x, y, depth = (self._travel_m(role) for role in ('across', 'along', 'press'))
-        vx, vy, down = (self._speed(role) for role in ('across', 'along', 'press'))
-        return Fingertip((x, y, self._profile.start_height_m - depth), (vx, vy, -down), self._force_n())
+        ways, speeds = dict.fromkeys(ROLES, 0.0), dict.fromkeys(ROLES, 0.0)
+        for role, motor in self._motors.items():
+            lever_m = self._joints[role].lever_m
+            ways[role] = (motor.position_rad - self._start[role]) * lever_m
+            speeds[role] = motor.velocity_rad_s * lever_m
+        place = (ways['across'], ways['along'], self._profile.start_height_m - ways['press'])
+        return Fingertip(place, (speeds['across'], speeds['along'], -speeds['press']), self._force_n())
 
     def goals(self, command: ArmCommand, dt_s: float) -> dict[int, tuple[float, float]]:
         """Return highest current and position for each motor."""
@@ -701,14 +706,6 @@ class DynamixelFinger:
     def _advance(self, role: str, angle_rad: float, max_lead_rad: float) -> None:
         at = self._motors[role].position_rad
         self._goal[role] = min(at + max_lead_rad, max(at - max_lead_rad, self._goal[role] + angle_rad))
-
-    def _travel_m(self, role: str) -> float:
-        if role not in self._motors:
-            return 0.0
-        return (self._motors[role].position_rad - self._start[role]) * self._joints[role].lever_m
-
-    def _speed(self, role: str) -> float:
-        return self._motors[role].velocity_rad_s * self._joints[role].lever_m if role in self._motors else 0.0
 
     def _force_n(self) -> float:
         if 'press' not in self._motors:

@@ -9,7 +9,7 @@ import termios
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from struct import Struct
 
@@ -94,7 +94,6 @@ class RailsArm(Arm):
         self._sent = 0
         self._states: deque[tuple[int, Vector]] = deque(maxlen=SPEED_OVER)  # device time in µs, and place
         self._state: ArmState | None = None
-        self._watchdog_stops = 0
 
     def connect(self) -> None:
         """Open the line, clear faults and wait for the first state.
@@ -168,16 +167,6 @@ class RailsArm(Arm):
         """Stop the rails; the pressing motor locks."""
         self._send(STOP)
 
-    @property
-    def counts(self) -> Mapping[str, int]:
-        """Totals: states taken, damaged or lost on the line, and stops of the watchdog."""
-        return {
-            'states': self._deframer.frames,
-            'bad_frames': self._deframer.bad_frames,
-            'lost_frames': self._deframer.lost,
-            'watchdog_stops': self._watchdog_stops,
-        }
-
     def _send(self, kind: int, body: bytes = b'') -> None:
         if self._failure or self._port is None:
             raise DeviceError(self._failure)
@@ -205,7 +194,7 @@ class RailsArm(Arm):
                 'or this package'
             )
             return
-        x, y, z, force_mn, flags, self._watchdog_stops = STATE_BODY.unpack(frame.body)
+        x, y, z, force_mn, flags, _watchdog_stops = STATE_BODY.unpack(frame.body)
         per_m, params = self._params.xy_counts_m, self._params
         place: Vector = (x / per_m, y / per_m, params.height_m + z / params.z_counts_m)
         self._states.append((frame.time_us, place))

@@ -12,7 +12,7 @@ import importlib
 import logging
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Protocol
 
@@ -221,12 +221,6 @@ class RosControllersArm(SurfaceArm):
     def zeroed(self) -> bool:
         """Whether the force sensor was zeroed since the arm was connected."""
         return self._zeroed
-
-    @property
-    def counts(self) -> Mapping[str, int]:
-        """Totals of this connection."""
-        self._connected()
-        return {'zeroed': self._tool.zero.zeroings}
 
     def step(self) -> None:
         """Take what was measured, and send what the newest command needs now; zero velocity if that fails.

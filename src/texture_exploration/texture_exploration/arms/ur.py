@@ -61,9 +61,6 @@ class UrReport(NamedTuple):
     `time_ns` is when it arrived, of CLOCK_MONOTONIC. `force_n` is the force of the surroundings on the tool; `zeroed`
     says that its sensor was zeroed since the arm was connected. `watchdog_s` is how long the controller's
     watchdog waits.
-
-    `counts` are totals since the arm was connected. `refused`: commands that the controller did not accept. `zeroed`:
-    zeroings of the force sensor.
     """
 
     time_ns: int
@@ -74,7 +71,6 @@ class UrReport(NamedTuple):
     safety_mode: int
     playing: bool
     zeroed: bool
-    counts: Mapping[str, int]
 
 
 # --------------------
@@ -169,20 +165,15 @@ class WorkerLink:
         self._channel.close()
 
     def _read(self) -> None:
-        while data := self._receive():
-            content = json.loads(data)
-            if isinstance(content, str):
-                self._failure = content
-            else:
-                self.report = UrReport._make(content)
-                self._state_received.set()
+        with contextlib.suppress(OSError):
+            while data := self._channel.recv(LARGEST):
+                content = json.loads(data)
+                if isinstance(content, str):
+                    self._failure = content
+                else:
+                    self.report = UrReport._make(content)
+                    self._state_received.set()
         self._state_received.set()
-
-    def _receive(self) -> bytes:
-        try:
-            return self._channel.recv(LARGEST)
-        except OSError:
-            return b''
 
     def _why_ended(self) -> str:
         self._reader.join(FINAL_MESSAGE_S)  # the last message of the worker may still be on its way
@@ -510,11 +501,6 @@ class UrArm(SurfaceArm):
     def zeroed(self) -> bool:
         """Whether the force sensor was zeroed since the arm was connected."""
         return self._report().zeroed
-
-    @property
-    def counts(self) -> Mapping[str, int]:
-        """Totals of this connection; see `texture_exploration.arms.ur.UrReport`."""
-        return self._report().counts
 
     def _connected(self) -> WorkerLink:
         if self._link is None:

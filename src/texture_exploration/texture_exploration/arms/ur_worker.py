@@ -15,7 +15,7 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -118,8 +118,6 @@ class UrCommandStream:
     """Turn the newest command of the arm into calls of ur-rtde."""
 
     def __init__(self, control: Any, params: UrArmParams, watchdog: Watchdog) -> None:
-        self.refused = 0
-        self.zeroings = 0
         self.trusted = False
         self._control = control
         self._params = params
@@ -151,75 +149,65 @@ class UrCommandStream:
         if mode is Mode.FORCE:
             self._air.presume_contact()
         if ur_command is None:
-            self._count(self._hold_still())
+            self._hold_still()
+        elif mode is Mode.FORCE:
+            self._force(ur_command)
         else:
-            self._count(self._force(ur_command) if mode is Mode.FORCE else self._speed(ur_command))
+            self._speed(ur_command)
 
     def stand_still(self) -> None:
-        """Stop at once, and return when the arm is at rest."""
+        """Stop at once, and return when the arm is at rest; commands that are acknowledged are not overwritten."""
         with self._watchdog.patient():
-            self._stop()
+            self._watchdog.call(self._control.speedStop, STOP_DECELERATION_M_S2)
+            if self._mode is Mode.FORCE:
+                self._watchdog.call(self._control.forceModeStop)
+            self._mode = Mode.STANDSTILL
 
     def _change(self, mode: Mode, ur_command: UrCommand | None) -> bool:
         """Leave the present mode; return whether the new one has begun."""
         # A command that streams takes effect at once; those that follow wait for each other.
         if self._mode is Mode.FORCE and ur_command is not None and self._turns_back(ur_command.velocity_m_s):
             # The finger has met something, and would be driven into it until the end of force control is acknowledged.
-            self._count(self._speed(ur_command._replace(velocity_m_s=self._along(ur_command.velocity_m_s))))
+            self._speed(ur_command._replace(velocity_m_s=self._along(ur_command.velocity_m_s)))
             return False
         if mode is Mode.STANDSTILL and not self._braking:
             self._braking = True
-            self._count(bool(self._control.speedL([0.0] * 6, STOP_DECELERATION_M_S2, 1.0 / RATE_HZ)))
+            self._control.speedL([0.0] * 6, STOP_DECELERATION_M_S2, 1.0 / RATE_HZ)
             return False
-        self._leave(mode)
+        if mode is Mode.STANDSTILL:
+            self.stand_still()
+        elif self._mode is Mode.FORCE:
+            with self._watchdog.patient():
+                self._watchdog.call(self._control.forceModeStop)
         # The watchdog guards every mode but standstill; at rest one that waits too long is set again.
         late = self._mode is Mode.STANDSTILL and self._watchdog.moving_s > 1.0 / self._params.watchdog_hz
         if mode is not Mode.STANDSTILL and (late or not self._watchdog.armed) and not self._watchdog.arm():
-            self._count(False)
             return False
         self._mode = mode
         self._rest_ns = self._measured_ns
         self._braking = self._next_is_speed = False
         return True
 
-    def _leave(self, mode: Mode) -> None:
-        """Do what ends the present mode."""
-        if mode is Mode.STANDSTILL:
-            self.stand_still()
-        elif self._mode is Mode.FORCE:
-            with self._watchdog.patient():
-                self._count(self._watchdog.call(self._control.forceModeStop))
-
-    def _stop(self) -> None:
-        """Come to rest; these commands are acknowledged, so nothing overwrites them."""
-        self._count(self._watchdog.call(self._control.speedStop, STOP_DECELERATION_M_S2))
-        if self._mode is Mode.FORCE:
-            self._count(self._watchdog.call(self._control.forceModeStop))
-        self._mode = Mode.STANDSTILL
-
-    def _hold_still(self) -> bool:
+    def _hold_still(self) -> None:
         """Zero the force sensor as soon as the arm has calmed down in free air."""
         if self._air.proven and self._measured_ns - self._rest_ns > CALM_NS:
             with self._watchdog.patient():
                 taken = self._watchdog.call(self._control.zeroFtSensor)
-            self._count(taken)
             if taken:
                 self.trusted = True
-                self.zeroings += 1
                 self._air.presume_contact()  # the force is another one now; the next zeroing needs a new proof
             else:
                 self._rest_ns = self._measured_ns  # free air is still proven: try again after another rest
-        return bool(self._control.kickWatchdog())
+        self._control.kickWatchdog()
 
-    def _speed(self, ur_command: UrCommand) -> bool:
+    def _speed(self, ur_command: UrCommand) -> None:
         velocity = [*ur_command.velocity_m_s, 0.0, 0.0, 0.0]
         if self._turns_back(ur_command.velocity_m_s):
             self._turned_ns = self._measured_ns
         self._led_m_s = ur_command.velocity_m_s
         # A finger that turns back has met something: as hard as a stop.
         turns = self._measured_ns - self._turned_ns < TURN_NS
-        acceleration = max(STOP_DECELERATION_M_S2 if turns else 0.0, ACCELERATION_M_S2)
-        return bool(self._control.speedL(velocity, acceleration, 1.0 / RATE_HZ))
+        self._control.speedL(velocity, STOP_DECELERATION_M_S2 if turns else ACCELERATION_M_S2, 1.0 / RATE_HZ)
 
     def _turns_back(self, velocity_m_s: Vector) -> bool:
         return sum(now * before for now, before in zip(velocity_m_s, self._led_m_s, strict=True)) < 0.0
@@ -229,19 +217,17 @@ class UrCommandStream:
         x, y, _ = self._frame.direction(velocity_m_s)
         return self._frame.to_base((x, y, 0.0))
 
-    def _force(self, ur_command: UrCommand) -> bool:
+    def _force(self, ur_command: UrCommand) -> None:
         """Command force and sliding alternately."""
         self._next_is_speed = not self._next_is_speed
         if not self._next_is_speed:
-            return self._speed(ur_command)
+            self._speed(ur_command)
+            return
         normal_only = [0, 0, 1, 0, 0, 0]
         wrench = [0.0, 0.0, -(ur_command.force_n or 0.0), 0.0, 0.0, 0.0]
         limits = [*(FORCE_DEVIATION_M,) * 2, FORCE_SPEED_M_S, *(FORCE_DEVIATION_RAD,) * 3]
         frame = list(self._params.surface_pose)
-        return bool(self._control.forceMode(frame, normal_only, wrench, FORCE_FRAME_FIXED, limits))
-
-    def _count(self, taken: bool) -> None:
-        self.refused += not taken
+        self._control.forceMode(frame, normal_only, wrench, FORCE_FRAME_FIXED, limits)
 
 
 # --------------------
@@ -265,8 +251,8 @@ LOST = 'the connection to the controller was lost; is it still on, and the cable
 class Observer:
     """Reports the measurements of the controller, in a separate thread: commands may take a while.
 
-    `newest` is the last report, None before the first; `idle` is set by each in which no program plays; `zeroed`,
-    `watchdog_s` and `counts` come from the other thread.
+    `newest` is the last report, None before the first; `idle` is set by each in which no program plays; `zeroed`
+    and `watchdog_s` come from the other thread.
 
     Silence counts only while this thread is awake, so that a stalled machine is not reported as a dead controller.
     """
@@ -275,7 +261,6 @@ class Observer:
         self.connected = True
         self.silent = self.zeroed = self.idle = False
         self.watchdog_s = 1.0 / params.watchdog_hz
-        self.counts: Mapping[str, int] = {}
         self.newest: UrReport | None = None
         self._receive = receive
         self._channel = channel
@@ -314,7 +299,6 @@ class Observer:
             safety_mode=receive.getSafetyMode(),
             playing=receive.getRuntimeState() == PROGRAM_PLAYING,
             zeroed=self.zeroed,
-            counts=self.counts,
         )
         self.newest = report
         self.idle |= not report.playing
@@ -384,7 +368,6 @@ class Worker:
         # After the cycle and not at once: a force that is reported as zeroed is from after the zeroing.
         self._observer.zeroed = commands.trusted
         self._observer.watchdog_s = self._watchdog.moving_s
-        self._observer.counts = {'refused': commands.refused, 'zeroed': commands.zeroings}
         self._control.waitPeriod(begin)
 
     def _watch_program(self) -> None:

@@ -466,7 +466,6 @@ class ExplorerNode(PatientLifecycleNode):
             'arm_fault': fault or 'none',
             'arm_state_age_s': self._explorer.arm_age_s(),
             **self._explorer.counts,
-            **{f'arm_{name}': count for name, count in self._explorer.arm_counts().items()},
         }
         if not self._active:
             return 'WARN', 'the explorer is not active: it has no control of the arm', numbers
