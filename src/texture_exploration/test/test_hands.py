@@ -47,8 +47,8 @@ pytestmark = pytest.mark.realtime
 DEADLINE_S = 30.0
 LEAP = load_profile('leap')
 REBOOT_IT = (
-    "motor 1 ('press' of index) reports overload; when it has cooled and nothing blocks it, reboot it "
-    "(service '~/reboot') or switch its power off and on"
+    "motor 1 ('press' of index) reports overload; when it has cooled and nothing blocks it, call `texture recover`, "
+    'or switch its power off and on'
 )
 THUMB = LEAP.fingers['thumb']['press'].id
 PARENT = """
@@ -121,9 +121,7 @@ def parent(bus):
 
 def test_a_failed_connection_leaves_no_motor_under_torque(bus, hand):
     bus.motors.fail(THUMB, OVERLOAD)
-    with pytest.raises(
-        DeviceError, match=r"motor 13 \('press' of thumb\) reports overload; .*reboot it \(service '~/reboot'\)"
-    ):
+    with pytest.raises(DeviceError, match=r"motor 13 \('press' of thumb\) reports overload; .*call `texture recover`"):
         hand.connect()
     assert torque_is_off(bus)
 
@@ -314,21 +312,23 @@ def test_firmware_whose_watchdog_is_known_not_to_stop_the_motor_is_reported(bus,
     assert hand.warning().startswith('the watchdog of motors 3, 5 may not stop them')
 
 
-def test_a_motor_with_a_latched_error_can_be_rebooted(bus, hand):
+def test_a_motor_with_a_latched_error_is_rebooted_by_a_recovery(bus):
     bus.motors.fail(1, OVERLOAD)
-    assert hand.reboot().startswith("rebooted: motor 1 ('press' of index)")
-    hand.connect()
-    until(lambda: fault_of(hand) == '')
-    assert hand.reboot().startswith('no motor that answers reports an error')
+    explorer = Explorer(arm_on(bus), TouchParams(), SafetyLimits(), lambda state: None)
+    with pytest.raises(DeviceError, match='reports overload'):
+        explorer.connect()
+    explorer.recover()
+    assert explorer.fault() == ''
+    explorer.close()
     assert torque_is_off(bus)
 
 
-def test_an_error_that_a_reboot_does_not_clear_is_reported(bus, hand, monkeypatch):
+def test_an_error_that_a_reboot_does_not_clear_is_named(bus, monkeypatch):
     monkeypatch.setattr('texture_exploration.arms.dynamixel.RESTART_S', 0.2)
     monkeypatch.setattr(bus.motors, 'reboot', lambda _motor: None)
     bus.motors.fail(1, OVERLOAD)
-    with pytest.raises(DeviceError, match=r'motor 1 .* still reports overload after a reboot; .*switch its power off'):
-        hand.reboot()
+    with pytest.raises(DeviceError, match=r'motor 1 .* reports overload'):
+        Explorer(arm_on(bus), TouchParams(), SafetyLimits(), lambda state: None).recover()
 
 
 def test_the_guard_sends_what_the_sdk_would_send(tmp_path):

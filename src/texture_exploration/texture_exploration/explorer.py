@@ -192,12 +192,6 @@ class Explorer:
             self._home = (x_m, y_m, max(z_m, height_m))  # a place in contact is no start
             return height_m - begin_m
 
-    def reboot(self) -> str:
-        """Reboot the motors that report an error; return what was done. The arm is released until the next request."""
-        with self._lock:
-            self._check_idle()
-            return self.arm.reboot()
-
     def touch_surface(self) -> str:
         """Record the position of the finger in contact for the surface frame; return the result as text.
 

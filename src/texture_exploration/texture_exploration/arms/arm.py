@@ -117,7 +117,6 @@ class Arm:
 
     Params: type[Any]
     noisy_force = False  # its measured force is never twice the same to the last bit, as that of a sensor with noise
-    reboots = False
     keeps_start = False  # nothing else moves it: explorations begin at the same place after a release
 
     def __init__(self, params: Any) -> None:
@@ -153,10 +152,6 @@ class Arm:
 
     def recover(self) -> None:
         """Release what the robot itself holds, such as a protective stop, before it is connected again."""
-
-    def reboot(self) -> str:
-        """Release the arm, reboot the motors that report an error, stay unconnected; return what was done."""
-        raise DeviceError('this arm has no motors that could be rebooted; use recover')
 
     def warning(self) -> str:
         """Return a warning in a sentence although the arm moves, '' if there is none."""

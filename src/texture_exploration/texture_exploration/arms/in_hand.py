@@ -41,7 +41,6 @@ class InHandArm(Arm):
     """
 
     Params = InHandParams
-    reboots = True
 
     def __init__(self, params: InHandParams = InHandParams()) -> None:
         self._params = params
@@ -101,10 +100,9 @@ class InHandArm(Arm):
         """Return what is not as it should be although the hand moves, '' if nothing."""
         return self.hand.warning()
 
-    def reboot(self) -> str:
-        """Release the object and reboot the motors that report an error; the arm is not connected any more."""
-        self.close()
-        return self.hand.reboot()
+    def recover(self) -> None:
+        """Release the object and reboot the motors that report an error."""
+        self.hand.reboot()
 
     def _take_hold(self) -> None:
         self.hand.grip(dict.fromkeys(self.fingers.hold, self._params.grip_force_n))

@@ -142,8 +142,6 @@ class ExplorerNode(PatientLifecycleNode):
         self._offer('~/stop', self._stop, group)
         self._offer('~/recover', self._recover, group)
         self._offer('~/lift', self._lift, group)
-        if self._explorer.arm.reboots:
-            self._offer('~/reboot', self._explorer.reboot, group)
         if self._explorer.arm.base_frame_id:
             self._offer('~/touch_surface', self._touch_surface, group)
             self._offer('~/forget_touches', self._forget_touches, group)
