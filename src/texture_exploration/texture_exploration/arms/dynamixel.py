@@ -532,18 +532,15 @@ class DynamixelHand:
     def _check(self, name: str, command: ArmCommand) -> None:
         """Refuse a command beyond its limits or beyond the current of the motor."""
         check_command(command, lambda: self._command_motors([name], STANDSTILL))
-        highest_n = self._highest_n(name)
+        joint, profile = self.profile.fingers[name]['press'], self.profile
+        highest_a = self._highest_a.get(joint.id, math.inf)
+        highest_n = (highest_a - profile.idle_a) * profile.torque_nm_a / abs(joint.lever_m)
         if command.force_n is not None and command.force_n > highest_n:
             self._command_motors([name], STANDSTILL)
             raise CommandRefused(
                 f'the command was refused and {name} stopped: the force is {command.force_n:g} N, and the Current '
                 f'Limit of its motor allows {highest_n:.3g} N; ask for less, or raise that limit with DYNAMIXEL Wizard'
             )
-
-    def _highest_n(self, name: str) -> float:
-        joint = self.profile.fingers[name]['press']
-        highest_a = self._highest_a.get(joint.id, math.inf)
-        return (highest_a - self.profile.idle_a) * self.profile.torque_nm_a / abs(joint.lever_m)
 
     def _run(self) -> None:
         bus = guard = None
@@ -582,13 +579,13 @@ class DynamixelHand:
             motors = bus.read()
             if not motors:
                 if bus.missing and self._fresh.is_set():
-                    self._publish(self._fault(bus, errors))  # at once: before the others have been read again
+                    self._publish(bus, errors)  # at once: before the others have been read again
                 continue
             if error := bus.check_next():
                 errors[error] = None
             goals = self._step(motors, min(LONGEST_STEP_S, now_s - stepped_s), now_s)
             stepped_s = now_s
-            self._publish(self._fault(bus, errors))
+            self._publish(bus, errors)
             bus.write_goals(goals)
 
     def _doubtful(self, deaf: Iterable[int]) -> str:
@@ -613,10 +610,8 @@ class DynamixelHand:
             goals.update(finger.goals(command, dt_s))
         return goals
 
-    def _fault(self, bus: DynamixelBus, errors: Iterable[str]) -> str:
-        return '; '.join(dict.fromkeys([*map(bus.why_missing, sorted(bus.missing)), *errors]))
-
-    def _publish(self, fault: str) -> None:
+    def _publish(self, bus: DynamixelBus, errors: Iterable[str]) -> None:
+        fault = '; '.join(dict.fromkeys([*map(bus.why_missing, sorted(bus.missing)), *errors]))
         tips = {name: finger.tip for name, finger in self._fingers.items()}
         self._state = HandState(time.monotonic_ns(), tips, fault)
         self._fresh.set()
