@@ -42,7 +42,6 @@ from texture_estimation.roughness import RoughnessAccumulator, load_roughness_re
 from texture_estimation.training import train
 from texture_evaluation.evaluate import run_model
 from texture_evaluation.train import training_examples
-from texture_exploration.arms.hand import SimulatedHand
 from texture_exploration.arms.in_hand import InHandArm, InHandParams
 from texture_exploration.arms.rails import RailsArm, RailsParams
 from texture_exploration.arms.simulated import SimulatedArm
@@ -441,16 +440,6 @@ def _simulated(recording: Recording) -> dict[str, Any]:
     return recording.stepped(arm, clock, lambda: clock.pace(arm))
 
 
-def _hand(recording: Recording) -> dict[str, Any]:
-    clock = _Clock()
-    hand = SimulatedHand(clock, own_thread=False)
-    grip = hand.grip
-    hand.grip = lambda forces_n: (grip(forces_n), [clock.pace(hand) for _ in range(100)])  # before it is looked at
-    recording.listen(hand, 'grip', lambda forces_n: ['grip', *forces_n.values()])
-    recording.listen(hand.fingers['index'], 'command', _command)
-    return recording.stepped(InHandArm(InHandParams(), hand), clock, lambda: clock.pace(hand))
-
-
 def _ros_controllers(recording: Recording) -> dict[str, Any]:
     harness = importlib.import_module('twist_robot')
     robot = harness.Robot(harness.TwistControllerParams(jitter_s=0.0))
@@ -487,7 +476,7 @@ def _dynamixel(recording: Recording) -> dict[str, Any]:
     motors = dynamixel.leap_hand()
     with tempfile.TemporaryDirectory() as folder, dynamixel.EmulatedDynamixelBus(Path(folder) / 'bus', motors) as bus:
         recording.listen(bus, '_execute', kind)
-        params = InHandParams(hand='dynamixel', device=str(bus.port.link), grip_timeout_s=20.0)
+        params = InHandParams(device=str(bus.port.link), grip_timeout_s=20.0)
         return recording.in_real_time(InHandArm(params), RUB)
 
 
@@ -495,7 +484,6 @@ ARMS: Mapping[str, Callable[[Recording], dict[str, Any]]] = {
     'arms: simulated': _simulated,
     'arms: ur': _ur,
     'arms: ros_controllers': _ros_controllers,
-    'arms: hand': _hand,
     'arms: rails': _rails,
     'arms: dynamixel': _dynamixel,
 }

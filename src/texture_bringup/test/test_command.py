@@ -102,7 +102,7 @@ def test_a_shell_completes_sub_commands_and_options(line, wanted):
 
 
 NODES = {'tare': 'sensor'}  # the others are of the explorer
-SERVICES = ['stop', 'recover', 'lift', 'reboot', 'touch-surface', 'forget-touches', 'tare']
+SERVICES = ['stop', 'recover', 'lift', 'touch-surface', 'forget-touches', 'tare']
 
 
 @pytest.mark.parametrize(('name', 'success'), [*((name, True) for name in SERVICES), ('stop', False)])

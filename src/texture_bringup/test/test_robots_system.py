@@ -32,7 +32,7 @@ IN_HAND = ['in_hand_sliding', '--speed', '0.02', '--duration', '2']
 OTHER = {'ur': CIRCULAR, 'hand': IN_HAND}
 ROBOTS = {'ur': 73, 'rails': 74, 'hand': 75, 'ros_controllers': 95}  # and the domain of its nodes
 PATIENCE = {  # of the arm itself; the explorer would warn of a parameter that its arm has not
-    'ur': {'silence_s': 1.5, 'watchdog_hz': 1.0, 'connect_timeout_s': 30.0},
+    'ur': {'watchdog_hz': 1.0, 'connect_timeout_s': 30.0},
     'ros_controllers': {'deadman_s': 1.5, 'connect_timeout_s': 30.0},
 }
 # Not the default of 1 N for arms whose approach is the slower the less force is wanted, as they may not be heard yet.

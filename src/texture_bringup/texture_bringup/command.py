@@ -28,7 +28,7 @@ GROUP, PACKAGE = 'texture.commands', 'texture_bringup'
 # In what order the help shows the commands; those of other packages come last.
 HELP: Mapping[str, Sequence[str]] = {
     'Start': ('demo', 'doctor', 'list', 'launch', 'dashboard', 'activate', 'deactivate', 'set'),
-    'Explore with the running robot': ('explore', 'watch', 'identify', 'stop', 'lift', 'recover', 'reboot'),
+    'Explore with the running robot': ('explore', 'watch', 'identify', 'stop', 'lift', 'recover'),
     'Prepare': ('tare', 'touch-surface', 'forget-touches', 'check'),
     'Record': ('collect', 'record', 'replay', 'info', 'import', 'segment', 'export'),
     'Learn': ('train', 'add', 'remove'),

@@ -7,10 +7,8 @@ import math
 import pytest
 
 from texture_core.errors import CommandRefused
-from texture_exploration.arms.arm import ArmCommand
-from texture_exploration.safety import CommandLimits
+from texture_exploration.arms.arm import ArmCommand, check_command
 
-LIMITS = CommandLimits()
 REFUSED = {
     'speed that is not a number': ArmCommand(tangential_m_s=(math.nan, 0.0)),
     'endless speed': ArmCommand(tangential_m_s=(0.0, -math.inf)),
@@ -31,7 +29,7 @@ REFUSED = {
 def test_a_command_out_of_range_is_refused_after_the_arm_was_stopped(name):
     stops = []
     with pytest.raises(CommandRefused, match=r'the arm stopped: the .* is \S+ (m/s|N); allowed is \S+ to \S+ (m/s|N)$'):
-        LIMITS.check(REFUSED[name], lambda: stops.append('stop'))
+        check_command(REFUSED[name], lambda: stops.append('stop'))
     assert stops == ['stop']
 
 
@@ -46,4 +44,4 @@ def test_a_command_out_of_range_is_refused_after_the_arm_was_stopped(name):
     ],
 )
 def test_a_command_within_the_limits_passes_and_stops_nothing(command):
-    LIMITS.check(command, lambda: pytest.fail('the arm was stopped'))
+    check_command(command, lambda: pytest.fail('the arm was stopped'))

@@ -4,8 +4,8 @@ import re
 
 import numpy as np
 
-from texture_core.types import Rejection, RoughnessEstimate, TextureEstimate
-from texture_exploration.exploration import ExplorationEstimates, may_stop, new_id
+from texture_core.types import Rejection, TextureEstimate
+from texture_exploration.exploration import may_stop, new_id
 
 
 def test_an_id_tells_time_and_number_and_differs_between_two_nodes_that_begin_at_once():
@@ -25,14 +25,3 @@ def test_a_known_texture_that_is_decided_ends_the_slide():
     assert not may_stop(texture(confidence=0.95))
     assert not may_stop(texture(confidence=0.95, decided=True, rejection=Rejection.NOVEL))
     assert not may_stop(texture(decided=True))  # confidence unknown
-
-
-def test_the_newest_estimates_stay_and_are_final_when_all_of_the_kinds_are():
-    estimates = ExplorationEstimates('one')
-    estimates.update(texture(windows=2))
-    estimates.update(RoughnessEstimate(1, 'one', final=True))
-    assert estimates.final(['roughness'])
-    assert not estimates.final(['texture', 'roughness'])
-    assert estimates.texture.windows == 2
-    estimates.update(texture(final=True))
-    assert estimates.final(['texture', 'roughness'])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Hands: simulated, and of Dynamixel motors through the unmodified dynamixel-sdk on an emulated bus.
+"""Hands of Dynamixel motors, through the unmodified dynamixel-sdk on an emulated bus.
 
 They hold and slide; whatever ends the command of motors ends their torque, and what is wrong with them is named.
 """
@@ -24,7 +24,7 @@ from texture_core.errors import CommandRefused, DeviceError, InvalidParameter, U
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.arm import ArmCommand
 from texture_exploration.arms.dynamixel import DynamixelBus, DynamixelFinger, DynamixelHand
-from texture_exploration.arms.hand import SimulatedHand, load_profile, read_profile
+from texture_exploration.arms.hand import load_profile, read_profile
 from texture_exploration.arms.in_hand import InHandArm, InHandParams
 from texture_exploration.explorer import Explorer
 from texture_exploration.safety import SafetyLimits
@@ -47,8 +47,8 @@ pytestmark = pytest.mark.realtime
 DEADLINE_S = 30.0
 LEAP = load_profile('leap')
 REBOOT_IT = (
-    "motor 1 ('press' of index) reports overload; when it has cooled and nothing blocks it, reboot it "
-    "(service '~/reboot') or switch its power off and on"
+    "motor 1 ('press' of index) reports overload; when it has cooled and nothing blocks it, call `texture recover`, "
+    'or switch its power off and on'
 )
 THUMB = LEAP.fingers['thumb']['press'].id
 PARENT = """
@@ -121,9 +121,7 @@ def parent(bus):
 
 def test_a_failed_connection_leaves_no_motor_under_torque(bus, hand):
     bus.motors.fail(THUMB, OVERLOAD)
-    with pytest.raises(
-        DeviceError, match=r"motor 13 \('press' of thumb\) reports overload; .*reboot it \(service '~/reboot'\)"
-    ):
+    with pytest.raises(DeviceError, match=r"motor 13 \('press' of thumb\) reports overload; .*call `texture recover`"):
         hand.connect()
     assert torque_is_off(bus)
 
@@ -182,7 +180,7 @@ def test_no_more_current_is_asked_for_than_a_motor_takes(bus, hand):
 def test_a_grip_that_is_refused_leaves_no_motor_under_torque(bus):
     bus.motors.write(THUMB, 38, (100).to_bytes(2, 'little'))
     with pytest.raises(CommandRefused, match='the force is 2 N, and the Current Limit'):
-        InHandArm(InHandParams(hand='dynamixel', device=str(bus.port.link))).connect()
+        InHandArm(InHandParams(device=str(bus.port.link))).connect()
     assert torque_is_off(bus)
 
 
@@ -308,40 +306,29 @@ def test_two_motors_with_one_id_are_named(bus, hand):
     assert re.search(r"motor 5 \('press' of middle\) answers with data that .* two motors have this id", fault_of(hand))
 
 
-def test_an_adapter_as_it_is_delivered_is_reported_as_too_slow(bus, hand):
-    hand.connect()
-    assert hand.warning() == ''
-    bus.latency_s = 0.016
-    until(lambda: 'of 80 cycles a second: set the latency timer of the USB adapter to 1 ms' in hand.warning())
-    until(lambda: fault_of(hand) == '')
-
-
 def test_firmware_whose_watchdog_is_known_not_to_stop_the_motor_is_reported(bus, hand):
     bus.motors.tables[3][6] = bus.motors.tables[5][6] = 51
     hand.connect()
     assert hand.warning().startswith('the watchdog of motors 3, 5 may not stop them')
 
 
-def test_a_motor_with_a_latched_error_can_be_rebooted(bus, hand):
+def test_a_motor_with_a_latched_error_is_rebooted_by_a_recovery(bus):
     bus.motors.fail(1, OVERLOAD)
-    assert hand.reboot().startswith("rebooted: motor 1 ('press' of index)")
-    hand.connect()
-    until(lambda: fault_of(hand) == '')
-    assert hand.reboot().startswith('no motor that answers reports an error')
+    explorer = Explorer(arm_on(bus), TouchParams(), SafetyLimits(), lambda state: None)
+    with pytest.raises(DeviceError, match='reports overload'):
+        explorer.connect()
+    explorer.recover()
+    assert explorer.fault() == ''
+    explorer.close()
     assert torque_is_off(bus)
 
 
-def test_an_error_that_a_reboot_does_not_clear_is_reported(bus, hand, monkeypatch):
+def test_an_error_that_a_reboot_does_not_clear_is_named(bus, monkeypatch):
     monkeypatch.setattr('texture_exploration.arms.dynamixel.RESTART_S', 0.2)
     monkeypatch.setattr(bus.motors, 'reboot', lambda _motor: None)
     bus.motors.fail(1, OVERLOAD)
-    with pytest.raises(DeviceError, match=r'motor 1 .* still reports overload after a reboot; .*switch its power off'):
-        hand.reboot()
-
-
-def test_a_simulated_hand_has_nothing_to_reboot():
-    with pytest.raises(DeviceError, match='a simulated hand has no motors that could be rebooted'):
-        InHandArm().reboot()
+    with pytest.raises(DeviceError, match=r'motor 1 .* reports overload'):
+        Explorer(arm_on(bus), TouchParams(), SafetyLimits(), lambda state: None).recover()
 
 
 def test_the_guard_sends_what_the_sdk_would_send(tmp_path):
@@ -355,21 +342,18 @@ def test_the_guard_sends_what_the_sdk_would_send(tmp_path):
     os.close(master)
 
 
-@pytest.mark.parametrize('kind', ['simulated', 'dynamixel'])
-def test_a_hand_refuses_what_exceeds_its_limits_and_goes_on(bus, hand, kind):
-    tested = hand if kind == 'dynamixel' else SimulatedHand()
-    tested.connect()
+def test_a_hand_refuses_what_exceeds_its_limits_and_goes_on(bus, hand):
+    hand.connect()
     for force_n in (math.nan, math.inf, -1.0, 60.0):
         with pytest.raises(CommandRefused, match='was refused and the arm stopped: the force is'):
-            tested.command(['index'], ArmCommand(force_n=force_n))
+            hand.command(['index'], ArmCommand(force_n=force_n))
         with pytest.raises(CommandRefused, match='was refused and the arm stopped: the force is'):
-            tested.grip({'index': force_n})
+            hand.grip({'index': force_n})
     for command in (ArmCommand(tangential_m_s=(math.nan, 0.0)), ArmCommand(normal_m_s=-5.0)):
         with pytest.raises(CommandRefused, match='was refused and the arm stopped: the speed'):
-            tested.command(['index'], command)
-    before = tested.state().time_ns
-    until(lambda: tested.state().time_ns > before and tested.state().fault == '')
-    tested.close()
+            hand.command(['index'], command)
+    before = hand.state().time_ns
+    until(lambda: hand.state().time_ns > before and hand.state().fault == '')
 
 
 # --------------------
@@ -377,7 +361,7 @@ def test_a_hand_refuses_what_exceeds_its_limits_and_goes_on(bus, hand, kind):
 
 
 def arm_on(bus, **params):
-    return InHandArm(InHandParams(hand='dynamixel', device=str(bus.port.link), grip_timeout_s=20.0, **params))
+    return InHandArm(InHandParams(device=str(bus.port.link), grip_timeout_s=20.0, **params))
 
 
 def rub(arm):
@@ -403,23 +387,11 @@ def rub(arm):
     return exploration.outcome, forces
 
 
-def test_the_simulated_hand_holds_while_two_fingers_slide():
-    arm = InHandArm()
-    outcome, forces = rub(arm)
-    assert outcome.success, outcome.message
-    for name in ('thumb', 'ring', 'little'):
-        assert np.ptp([force[name] for force in forces]) < 0.05
-        assert forces[-1][name] == pytest.approx(2.0, rel=0.05)
-    for name in ('index', 'middle'):
-        assert np.mean([force[name] for force in forces]) == pytest.approx(1.0, rel=0.1)
-
-
-def test_a_finger_that_loses_the_object_is_a_fault_that_names_it():
-    hand = SimulatedHand()
-    arm = InHandArm(InHandParams(finger_set='kaboli-test'), hand)
+def test_a_finger_that_loses_the_object_is_a_fault_that_names_it(bus):
+    arm = arm_on(bus)
     arm.connect()
-    hand.fingers['ring']._force_n = lambda *_: 0.1
-    until(lambda: arm.state().fault.startswith('the grip is lost: ring presses with'))
+    bus.motors.stiffness_n_m = 0.0
+    until(lambda: arm.state().fault.startswith('the grip is lost: thumb presses with'))
     arm.close()
 
 
@@ -514,6 +486,6 @@ def test_a_hand_of_another_model_or_without_power_is_reported(bus, monkeypatch):
 
 def test_without_an_object_there_is_nothing_to_hold(tmp_path):
     with EmulatedDynamixelBus(tmp_path / 'bus', leap_hand(stiffness_n_m=0.0)) as bus:
-        arm = InHandArm(InHandParams(hand='dynamixel', device=str(bus.port.link), grip_timeout_s=1.0))
+        arm = InHandArm(InHandParams(device=str(bus.port.link), grip_timeout_s=1.0))
         with pytest.raises(DeviceError, match='there is nothing to hold: thumb presses with'):
             arm.connect()

@@ -112,12 +112,6 @@ def test_a_force_that_never_stops_changing_aborts_after_the_travel_of_an_approac
     assert table.arm.state().position[2] < table.home[2] + 0.052
 
 
-def test_a_stop_during_the_lift_ends_the_exploration(table, lifting_first):
-    table.when[Phase.APPROACH] = lambda: table.exploration.stop('enough')
-    assert table.explore(REQUEST).message == 'enough'
-    assert table.phases[-1] is Phase.ABORTED
-
-
 def lifts_first(explorer):
     """Explore; return whether the finger rose above the height at which explorations begin."""
     table = explorer.table

@@ -88,7 +88,7 @@ def test_an_exploration_on_the_rails_slides_as_in_the_paper(rails, arm):
 
 def test_bytes_lost_on_the_line_are_counted_and_survived(rails, arm):
     rails.faults = ByteFaults(drop=0.01)
-    until(lambda: arm.counts['bad_frames'] > 3)
+    until(lambda: arm._deframer.bad_frames > 3)
     before = arm.state().time_ns
     until(lambda: arm.state().time_ns > before)
 

@@ -66,7 +66,7 @@ def test_the_tangential_force_is_friction_times_the_normal_force_and_unknown_at_
 
 def test_the_sensor_is_not_zeroed_in_contact(robot):
     robot.zero_force()
-    robot.arm.recover()
+    robot.connect()
     assert not robot.arm.zeroed
     robot.machine.position = robot.machine._origin - [0.0, 0.0, 0.02]  # 40 N
     robot.pass_time(0.3, ArmCommand(normal_m_s=0.01))
@@ -140,7 +140,7 @@ def test_a_controller_that_ends_is_named(robot):
     robot.pass_time(0.3, ArmCommand(tangential_m_s=(0.02, 0.0)))
     assert "no node subscribes to 'twist_controller/twist' any more" in robot.arm.state().fault
     robot.heard_by = 1
-    robot.arm.recover()
+    robot.connect()
     robot.pass_time(0.1, ArmCommand(tangential_m_s=(0.02, 0.0)))
     assert robot.arm.state().fault == ''
 
@@ -176,7 +176,7 @@ def test_an_arm_whose_link_or_controller_was_away_rests_0_3_s_after_it_returns(t
     robot.pass_time(0.3)
     assert np.linalg.norm(robot.machine.velocity) == 0.0
     robot.pass_time(1.0)
-    robot.arm.recover()
+    robot.connect()
     robot.pass_time(0.6, ArmCommand(tangential_m_s=(0.03, 0.0)))
     assert robot.arm.state().fault == ''
     assert np.linalg.norm(robot.machine.velocity) == pytest.approx(0.03)
@@ -248,7 +248,7 @@ def test_a_controller_that_is_gone_for_6_ms_in_the_slide_ends_it_with_the_finger
 
 @pytest.mark.parametrize('why', ["'/other' also commands the arm", 'the guard process has ended'])
 def test_what_makes_the_arm_unsafe_while_it_obeys_ends_the_slide_with_the_finger_lifted(why):
-    robot = Robot(replace(NO_NOISE, start_height_m=0.003, force_noise_n=0.002)).connect()
+    robot = Robot(replace(NO_NOISE, start_height_m=0.003, force_noise_n=0.002), connect_timeout_s=0.1).connect()
     outcome = robot.explore(SLIDE, on_slide=lambda: setattr(robot, 'unsafe_because', why))
     assert not outcome.success
     assert why in outcome.message
@@ -259,7 +259,7 @@ def test_what_makes_the_arm_unsafe_while_it_obeys_ends_the_slide_with_the_finger
     explorer = robot.explorer()
     assert why in explorer.fault()
     with pytest.raises(DeviceError, match=why):
-        robot.arm.recover()
+        explorer.recover()
 
 
 def test_a_process_that_was_told_to_end_waits_for_no_controller_and_commands_nothing(monkeypatch):

@@ -22,7 +22,6 @@ pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 PAGE = Path(__file__).parents[3] / 'docs' / 'operate.md'
 LINE = re.compile(r'`(ros2 (?:service call|action send_goal) [^`]+)`')
 OF_OTHERS = {
-    '/explorer/reboot',
     '/explorer/touch_surface',
     '/explorer/forget_touches',
     '/sensor/tare',

@@ -85,22 +85,20 @@ def test_a_stall_in_mid_slide_aborts_and_lifts(table):
     assert (lifted - jammed) * 1e-9 < 0.5
 
 
-def slid(seconds=1.0, force_n=lambda s: 1.0, speed=lambda s: 1.0, tangential_n=lambda s: math.nan, **given):
+def slid(seconds=1.0, force_n=lambda s: 1.0, speed=lambda s: 1.0):
     """Return which states of a slide at 20 mm/s and 1 N count as steady, and what is said at its end."""
-    watch, x_m, steady = SlideWatch(SPEED_M_S, 1.0, TouchParams(**given)), 0.0, []
+    watch, x_m, steady = SlideWatch(SPEED_M_S, 1.0, TouchParams()), 0.0, []
     for number in range(round(seconds / STEP_S)):
         now_s = number * STEP_S
         x_m += speed(now_s) * SPEED_M_S * STEP_S
         velocity = (speed(now_s) * SPEED_M_S, 0.0, 0.0)
-        state = ArmState(
-            round(now_s * 1e9), (x_m, 0.0, 0.0), velocity, force_n(now_s), tangential_force_n=tangential_n(now_s)
-        )
+        state = ArmState(round(now_s * 1e9), (x_m, 0.0, 0.0), velocity, force_n(now_s))
         steady.append(watch.update(state, constant=True))
     return steady, watch.flaw()
 
 
 def test_a_slide_as_asked_is_steady_and_without_flaw():
-    steady, flaw = slid(force_n=lambda s: 1.0 + 0.2 * math.sin(50 * s), tangential_n=lambda s: 1.5)
+    steady, flaw = slid(force_n=lambda s: 1.0 + 0.2 * math.sin(50 * s))
     assert all(steady)
     assert flaw == ''
 
@@ -126,13 +124,6 @@ def test_a_short_peak_of_the_force_is_not_steady_and_named_although_the_mean_is_
 
 def test_one_wrong_reading_of_the_force_is_none():
     assert slid(force_n=lambda s: 5.0 if abs(s - 0.5) < 0.004 else 1.0)[1] == ''
-
-
-def test_a_force_along_the_surface_beyond_friction_is_no_success():
-    assert 'the mean force along the surface was 2.50 N, and 2.00 N' in slid(tangential_n=lambda s: -2.5)[1]
-    steady, flaw = slid(tangential_n=lambda s: 3.5 if s >= 0.9 else 0.5)
-    assert not steady[-1]
-    assert flaw.startswith('the force along the surface of the slide reached 3.5 N, and 3 N are allowed')
 
 
 def test_turns_are_no_part_of_the_speed_that_was_asked_for():

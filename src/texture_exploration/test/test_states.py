@@ -12,7 +12,7 @@ from table_arm import TableArmParams
 
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration import force_control, guards, lift_first, safety, stages, touch, watches
-from texture_exploration.arms.arm import STANDSTILL
+from texture_exploration.arms import arm
 from texture_exploration.explorer import PERIOD_S
 from texture_exploration.motions import MOTIONS
 
@@ -34,7 +34,7 @@ def kind(command):
     """Return which kind of command it is, in the words of the table."""
     if command.force_n is not None:
         return 'press'
-    if command == STANDSTILL:
+    if command == arm.STANDSTILL:
         return 'rest'
     return 'along' if any(command.tangential_m_s) else 'up' if command.normal_m_s > 0 else 'down'
 
@@ -57,8 +57,8 @@ def test_each_state_commands_and_leads_to_what_its_row_says(make_table, monkeypa
     plan, timed_step, begin = MOTIONS['linear_slide'], stages.Stage.timed_step, stages.Stage.begin
     monkeypatch.setitem(MOTIONS, 'linear_slide', lambda *given: plan(*given).lift_first(lambda: True))
 
-    def noted(stage, time_ns, arm):
-        command = timed_step(stage, time_ns, arm)
+    def noted(stage, time_ns, state):
+        command = timed_step(stage, time_ns, state)
         if command is not None:
             seen.append((type(stage), kind(command)))
         return command
@@ -78,10 +78,10 @@ def test_each_state_commands_and_leads_to_what_its_row_says(make_table, monkeypa
 
 def values():
     """Return the value of each limit as the page writes it."""
-    limits, touching, commands = safety.SafetyLimits(), touch.TouchParams(), safety.CommandLimits()
+    limits, touching = safety.SafetyLimits(), touch.TouchParams()
     low_m, high_m, wall_n = limits.z_low_m, limits.z_high_m, touch.WALL_SHARE * limits.force_limit_n
     stages_s = limits.approach_timeout_s, limits.contact_timeout_s, limits.slide_overtime_s, limits.lift_timeout_s
-    speeds = commands.command_speed_m_s, commands.command_normal_m_s, commands.command_force_n
+    speeds = arm.MOST_COMMAND_M_S, arm.MOST_NORMAL_COMMAND_M_S, arm.MOST_COMMAND_N
     return {
         'MOST_FORCE_N, MOST_M': f'finite, {safety.MOST_FORCE_N / 1e3:g} kN, {safety.MOST_M:g} m',
         'force_limit_n': f'{limits.force_limit_n:g} N',
@@ -102,7 +102,7 @@ def values():
         'MOST_FORCE_SHARE': f'{100 * lift_first.MOST_FORCE_SHARE:g} % of force_limit_n',
         'approach_travel_m': f'{1e3 * touching.approach_travel_m:g} mm',
         'approach_timeout_s, …': f'{", ".join(f"{one:g}" for one in stages_s)} s',
-        'command_speed_m_s, …': f'{speeds[0]:g} m/s, {speeds[1]:g} m/s, {speeds[2]:g} N',
+        'MOST_COMMAND_M_S, …': f'{speeds[0]:g} m/s, {speeds[1]:g} m/s, {speeds[2]:g} N',
     }
 
 

@@ -19,17 +19,16 @@ def test_coulomb_friction_is_its_coefficient_times_the_normal_force_whichever_wa
     assert tangential_force_n(force, (0.05 * along[0], 0.05 * along[1], 0.01)) == pytest.approx(0.6)
 
 
-def test_a_force_across_the_direction_of_travel_is_no_friction():
-    assert tangential_force_n((0.0, 1.5, 2.0), (0.05, 0.0, 0.0)) == 0.0
+CASES = [
+    ((0.0, 1.5, 2.0), 0.05, 0.0),  # across the direction of travel
+    ((0.5, 0.0, 2.0), 0.05, -0.5),  # it pushes the finger onwards
+    *[((-0.6, 0.0, 2.0), speed_m_s, math.nan) for speed_m_s in (0.0, 0.9 * SLIDING_M_S, math.nan)],  # it does not slide
+]
 
 
-def test_what_pushes_the_finger_onwards_is_negative():
-    assert tangential_force_n((0.5, 0.0, 2.0), (0.05, 0.0, 0.0)) == -0.5
-
-
-@pytest.mark.parametrize('speed_m_s', [0.0, 0.9 * SLIDING_M_S, math.nan])
-def test_a_finger_that_does_not_slide_has_none(speed_m_s):
-    assert math.isnan(tangential_force_n((-0.6, 0.0, 2.0), (speed_m_s, 0.0, 0.5)))
+@pytest.mark.parametrize(('force_n', 'speed_m_s', 'expected'), CASES)
+def test_a_force_across_is_none_one_onwards_negative_and_that_of_a_resting_finger_unknown(force_n, speed_m_s, expected):
+    assert tangential_force_n(force_n, (speed_m_s, 0.0, 0.5)) == pytest.approx(expected, nan_ok=True)
 
 
 class Link:
@@ -45,7 +44,7 @@ class Link:
 def test_the_ur_arm_reports_it_in_the_frame_of_a_tilted_surface(monkeypatch):
     axes = rotation_matrix((0.2, -0.4, 0.0))
     velocity, force = axes @ np.array([0.03, 0.04, 0.0]), axes @ np.array([-0.36, -0.48, 2.0])  # 0.3 of 2 N
-    report = UrReport(1, (0.4, 0.0, 0.1), tuple(velocity), tuple(force), 0.1, 1, True, False, True, {})
+    report = UrReport(1, (0.4, 0.0, 0.1), tuple(velocity), tuple(force), 0.1, 1, True, True)
     arm = UrArm(UrArmParams(surface_rx_rad=0.2, surface_ry_rad=-0.4))
     monkeypatch.setattr(arm, '_link', Link(report))
     state = arm.state()

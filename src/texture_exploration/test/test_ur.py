@@ -28,7 +28,7 @@ from texture_core.types import ExplorationRequest, FingerReceiver, Phase
 from texture_exploration.arms import ur
 from texture_exploration.arms.arm import ArmCommand
 from texture_exploration.arms.ur import UrArm, UrArmParams
-from texture_exploration.exploration import Exploration
+from texture_exploration.exploration import Exploration, arm_fault
 from texture_exploration.explorer import Explorer, Pacer
 from texture_exploration.motions import MOTIONS
 from texture_exploration.safety import SafetyLimits
@@ -124,10 +124,10 @@ def keep(arm, command, condition):
 
 def zero(arm):
     """Rise in free air and rest, until the force sensor is zeroed."""
-    before, height_m = arm.counts.get('zeroed', 0), arm.state().position[2]
+    height_m = arm.state().position[2]
     keep(arm, ArmCommand(normal_m_s=0.02), lambda: arm.state().position[2] > height_m + 0.008)
     arm.stop()
-    wait_for(lambda: arm.counts.get('zeroed', 0) > before)
+    wait_for(lambda: arm.zeroed)
 
 
 def faulty(arm):
@@ -198,7 +198,7 @@ def dashboard(answers):
 def test_it_touches_holds_2_newtons_slides_50_mm_at_20_mm_s_and_lifts(emulator, record_property):
     phases = []
     explorer = Explorer(
-        UrArm(UrArmParams(ip=emulator.ip, silence_s=1.0)),
+        UrArm(UrArmParams(ip=emulator.ip)),
         TouchParams(peak_speed_fraction=3.4),  # emulated, it makes up for up to 0.1 s; the speed is measured below
         SafetyLimits(state_timeout_s=1.0),  # a busy machine may hold the process up; silence is tested below
         lambda state: phases.append((state.stamp_ns, state.phase)),
@@ -210,7 +210,6 @@ def test_it_touches_holds_2_newtons_slides_50_mm_at_20_mm_s_and_lifts(emulator, 
         assert exploration.ended.wait(DEADLINE_S)
         assert exploration.outcome.success, exploration.outcome.message
         end = explorer.arm.state()
-        counts = explorer.arm.counts
     finally:
         explorer.close()
     begin_ns = min(stamp for stamp, phase in phases if phase is Phase.SLIDE)
@@ -222,14 +221,12 @@ def test_it_touches_holds_2_newtons_slides_50_mm_at_20_mm_s_and_lifts(emulator, 
     speed_m_s = np.polyfit(times_s - times_s[0], places_m, 1)[0]
     record_property('speed_m_s', float(speed_m_s))
     record_property('force_n', float(forces_n.mean()))
-    record_property('counts', dict(counts))
     assert speed_m_s == pytest.approx(0.02, rel=0.02)
     assert np.all(np.abs(forces_n - 2.0) <= 0.1)
     assert places_m[-1] - places_m[0] == pytest.approx(0.05, abs=0.001)
     # In a pause of the machine, of which steps too late tell, it goes on being lifted.
     assert -0.001 < end.position[2] - home[2] < (0.004 if explorer.counts['late_steps'] else 0.001)
     assert abs(end.force_n) < 0.2
-    assert counts['refused'] == 0
 
 
 def test_commands_and_states_are_in_the_frame_of_the_surface(emulator):
@@ -257,14 +254,14 @@ def test_the_force_sensor_is_zeroed_in_the_air_but_not_in_contact(arm, emulator)
     assert arm.state().force_n == pytest.approx(3.0, abs=0.3)
 
 
-def test_a_protective_stop_is_a_fault_that_recover_clears_without_a_new_process(arm, emulator):
+def test_a_protective_stop_is_a_fault_that_recover_clears_for_a_new_connection(arm, emulator):
     keep(arm, SLIDING, emulator.moves)
-    worker = arm._link.process.pid
     emulator.controller.ask('emulate protective stop')
     wait_for(lambda: faulty(arm) == 'protective stop')
     wait_for(emulator.rests)
     arm.recover()
-    assert (faulty(arm), arm._link.process.pid) == ('', worker)
+    arm.connect()
+    assert faulty(arm) == ''
     keep(arm, SLIDING, emulator.moves)
 
 
@@ -276,20 +273,14 @@ def test_connecting_releases_no_protective_stop(arm, emulator):
     wait_for(lambda: 'releasing' in emulator.controller.ask('unlock protective stop'))  # as a person at the pendant
 
 
-def test_a_frozen_controller_is_a_fault_within_150_ms_and_stops_when_it_thaws(arm, emulator, record_property):
+def test_the_state_of_a_frozen_controller_becomes_old_and_its_arm_stops_when_it_thaws(arm, emulator):
     keep(arm, SLIDING, emulator.moves)
     try:
-        with Ticker() as ticker:
-            emulator.controller.freeze()
-            last_ns = emulator.fingers[-1].time_ns
-            keep(arm, SLIDING, lambda: faulty(arm))
-            silent_s = (time.monotonic_ns() - last_ns) * 1e-9
-        record_property('detected_s', silent_s)
-        assert 'silent' in faulty(arm)
-        assert 0.1 <= silent_s < 0.15 + ticker.worst_s
+        emulator.controller.freeze()
+        keep(arm, SLIDING, lambda: 'has not answered' in arm_fault(arm.state(), time.monotonic_ns(), SafetyLimits()))
     finally:
         emulator.controller.resume()
-    wait_for(lambda: faulty(arm) == '' and emulator.rests())
+    wait_for(lambda: arm_fault(arm.state(), time.monotonic_ns(), SafetyLimits()) == '' and emulator.rests())
     keep(arm, SLIDING, emulator.moves)
 
 
@@ -452,24 +443,9 @@ def test_after_a_protective_stop_in_contact_the_same_force_is_pressed_again():
         emulator.controller.ask('emulate protective stop')
         wait_for(lambda: arm.state().fault == 'protective stop')
         arm.recover()
+        arm.connect()
         zero(arm)
         assert press(arm, emulator) == pytest.approx(3.0, abs=0.3)
-
-
-def test_after_a_recovery_the_arm_stands_still_until_it_is_reported_to_move():
-    """Commands hold for 2 s here: one of before, in the worker or in a register of the controller, would be obeyed."""
-    with bench_at('127.0.0.84') as emulator, connected(emulator.ip, command_timeout_s=2.0, silence_s=1.0) as arm:
-        keep(arm, SLIDING, emulator.moves)
-        emulator.controller.ask('emulate protective stop')
-        keep(arm, SLIDING, lambda: arm.state().fault == 'protective stop')
-        keep(arm, SLIDING, emulator.rests)
-        seen = len(emulator.fingers)
-        arm.recover()
-        assert arm.state().fault == ''
-        wait_for(lambda: len(emulator.fingers) > seen + 500)
-        after = list(emulator.fingers)[seen:]
-        assert all(finger.vx_m_s == finger.vy_m_s == finger.vz_m_s == 0.0 for finger in after)
-        keep(arm, SLIDING, emulator.moves)
 
 
 @pytest.fixture(scope='module')
@@ -495,8 +471,7 @@ def test_slow_acknowledgements_of_stops_and_zeroing_do_not_trip_the_watchdog(lat
         arm.stop()
         wait_for(emulator.rests)
     assert arm.state().fault == ''
-    counts = arm.counts
-    assert (counts['refused'], counts['zeroed'] >= 1) == (0, True)
+    assert arm.zeroed
 
 
 def test_after_a_slow_acknowledgement_the_watchdog_guards_the_moving_arm_as_before(late):
@@ -537,7 +512,7 @@ DEAFNESS = {
 def test_an_approach_that_hears_nothing_from_the_contact_on_presses_little_harder_than_asked(what, late_s):
     """Asked: 1.5 times the wanted force; a busy machine may hold the emulated watchdog up for another 0.1 s."""
     with bench_at('127.0.0.83', surface_z_m=0.1 + ABOVE_PLANE_M) as emulator:
-        arm = UrArm(UrArmParams(ip=emulator.ip, silence_s=1.0))
+        arm = UrArm(UrArmParams(ip=emulator.ip))
         explorer = Explorer(arm, TouchParams(), SafetyLimits(state_timeout_s=1.0), lambda state: None)
         explorer.connect()
         try:
@@ -631,7 +606,7 @@ def test_a_wall_in_the_slide_and_on_the_way_to_the_start_is_met_gently_and_left_
     touch, limits = TouchParams(), SafetyLimits(state_timeout_s=2.0)
     felt, done = [], threading.Event()
     # The controller's own protective stop is not what is tested here.
-    with bench_at(ip, wall_m=0.02, stop_force_n=1e5) as emulator, connected(ip, silence_s=1.0) as arm:
+    with bench_at(ip, wall_m=0.02, stop_force_n=1e5) as emulator, connected(ip) as arm:
 
         def feel():
             while not done.is_set():

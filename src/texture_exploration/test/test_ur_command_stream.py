@@ -11,14 +11,7 @@ from texture_core.errors import DeviceError
 from texture_core.types import ExplorationRequest
 from texture_exploration.arms import ur as ur_probe
 from texture_exploration.arms.arm import ArmCommand
-from texture_exploration.arms.ur import (
-    COMMAND,
-    UrArm,
-    UrArmParams,
-    UrCommand,
-    UrReport,
-    command_of,
-)
+from texture_exploration.arms.ur import UrArm, UrArmParams, UrCommand, UrReport
 from texture_exploration.arms.ur_worker import STOP_DECELERATION_M_S2, UrCommandStream, Watchdog
 from texture_exploration.explorer import Explorer
 from texture_exploration.safety import SafetyLimits
@@ -74,8 +67,8 @@ def test_a_zeroing_that_the_controller_did_not_take_is_tried_again_where_the_arm
     arm = Arm(refusals)
     arm.cycles(0.1, RISING)
     arm.cycles(1.0, None)
-    assert (arm.stream.trusted, arm.stream.zeroings, arm.control.zeroed) == (True, 1, 1)
-    assert arm.stream.refused == refusals
+    assert (arm.stream.trusted, arm.control.zeroed) == (True, 1)
+    assert arm.control.refusals == -1
 
 
 def test_without_a_rise_nothing_is_zeroed_and_nothing_is_pressed():
@@ -100,13 +93,13 @@ class SteppedLink:
     def report(self):
         robot, stream = self.robot, self.stream
         measured = (tuple(vector[:3].tolist()) for vector in (robot.pose, robot.velocity, robot.force))
-        return UrReport(self.now_ns, *measured, 0.1, 1, True, False, stream.trusted, {})
+        return UrReport(self.now_ns, *measured, 0.1, 1, True, stream.trusted)
 
     def check(self):
         pass
 
-    def send(self, data):
-        self.wish = command_of(data) if data[:1] == COMMAND else None
+    def send(self, command):
+        self.wish = command
 
     def pace(self):
         for _ in range(5):
@@ -313,7 +306,7 @@ def test_without_ur_rtde_the_sentence_says_what_to_install(monkeypatch):
 
 def test_an_arm_that_was_never_connected_says_so():
     arm = UrArm()
-    for call in (arm.state, arm.stop, arm.recover, lambda: arm.command(ArmCommand((0.02, 0.0)))):
+    for call in (arm.state, arm.stop, lambda: arm.command(ArmCommand((0.02, 0.0)))):
         with pytest.raises(DeviceError, match='connect it first'):
             call()
     arm.close()

@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""One exploration: the control loop of a motion and an arm with its supervision, its end and its estimates."""
+"""One exploration: the control loop of a motion and an arm with its supervision and its end."""
 
 from __future__ import annotations
 
 import contextlib
 import logging
 import threading
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from typing import Any
@@ -15,42 +15,11 @@ from typing import Any
 import numpy as np
 
 from texture_core.errors import CommandRefused, DeviceError, ExplorationError, MotionRefused, TextureError, UnknownName
-from texture_core.types import ENDED, ExplorationRequest, ExplorationState, Phase, RoughnessEstimate, TextureEstimate
+from texture_core.types import ENDED, ExplorationRequest, ExplorationState, Phase, TextureEstimate
 from texture_exploration.arms.arm import Arm, ArmCommand, ArmState, SurfaceFrame
 from texture_exploration.guards import GAP_NS, WITHOUT_GAPS, ForceGuard, ForceWatch, Listening, sound
 from texture_exploration.motion import Motion, MotionStep
 from texture_exploration.safety import SafetyLimits
-
-# --------------------
-# Collect the estimates of one exploration.
-
-
-def may_stop(estimate: TextureEstimate) -> bool:
-    """Return whether a texture estimate may end the slide; one with unknown confidence may not."""
-    return estimate.accepted and estimate.decided and estimate.confidence >= 0.0
-
-
-class ExplorationEstimates:
-    """The newest texture and roughness estimate of one exploration."""
-
-    def __init__(self, exploration_id: str) -> None:
-        self.texture = TextureEstimate(0, exploration_id)
-        self.roughness = RoughnessEstimate(0, exploration_id)
-
-    def update(self, estimate: TextureEstimate | RoughnessEstimate) -> None:
-        """Take a newer estimate."""
-        if isinstance(estimate, TextureEstimate):
-            self.texture = estimate
-        else:
-            self.roughness = estimate
-
-    def final(self, kinds: Collection[str]) -> bool:
-        """Return whether the estimates of these kinds ('texture', 'roughness') are final."""
-        return all(getattr(self, kind).final for kind in kinds)
-
-
-# --------------------
-# One exploration: the control loop of a motion and an arm, with its supervision.
 
 LOGGER = logging.getLogger(__name__)
 MOST_CHARACTERS = 200  # of the message of an error, which may hold a whole array
@@ -98,6 +67,11 @@ def new_id(time_ns: int, number: int, rng: np.random.Generator) -> str:
     """
     begin = datetime.fromtimestamp(time_ns // 1_000_000_000, tz=timezone.utc)
     return f'{begin:%Y%m%dT%H%M%S}-{number:03d}-{rng.integers(0x10000):04x}'
+
+
+def may_stop(estimate: TextureEstimate) -> bool:
+    """Return whether a texture estimate may end the slide; one with unknown confidence may not."""
+    return estimate.accepted and estimate.decided and estimate.confidence >= 0.0
 
 
 def refusal(error: TextureError) -> ExplorationError:

@@ -5,11 +5,10 @@
 from __future__ import annotations
 
 import contextlib
-import math
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict
 
 from texture_core.config import find, place_of
@@ -98,19 +97,6 @@ class Explorer:
         if not self.arm.keeps_start:
             self._home = None
 
-    def arm_age_s(self) -> float:
-        """Return the age of the newest state of the arm, s; NaN if it cannot be reached."""
-        try:
-            return (self.clock() - self.arm.state().time_ns) * 1e-9
-        except DeviceError:
-            return math.nan
-
-    def arm_counts(self) -> Mapping[str, int]:
-        """Return the totals of the arm, none if it has none or cannot be reached."""
-        with contextlib.suppress(DeviceError):
-            return self.arm.counts
-        return {}
-
     def fault(self) -> str:
         """Return in a sentence why the arm cannot move now, '' if it can."""
         try:
@@ -156,7 +142,7 @@ class Explorer:
         return True
 
     def recover(self) -> None:
-        """Free the arm from a fault, by its recovery or by connecting again; the caller makes sure that it may move.
+        """Free the arm from a fault by connecting again; the caller makes sure that it may move.
 
         The next exploration lifts first, as the finger may still press.
         """
@@ -166,7 +152,6 @@ class Explorer:
             if self.fault():
                 with contextlib.suppress(DeviceError):  # connecting again also reports it
                     self.arm.recover()
-            if self.fault():
                 self.connect()
 
     def lift(self) -> float:
@@ -198,12 +183,6 @@ class Explorer:
             x_m, y_m, z_m = self._home
             self._home = (x_m, y_m, max(z_m, height_m))  # a place in contact is no start
             return height_m - begin_m
-
-    def reboot(self) -> str:
-        """Reboot the motors that report an error; return what was done. The arm is released until the next request."""
-        with self._lock:
-            self._check_idle()
-            return self.arm.reboot()
 
     def touch_surface(self) -> str:
         """Record the position of the finger in contact for the surface frame; return the result as text.

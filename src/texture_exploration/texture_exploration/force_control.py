@@ -15,8 +15,7 @@ later than declared, or a contact that is stiffer, is named: at the first touch,
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from statistics import fmean
 
@@ -24,77 +23,42 @@ import numpy as np
 
 from texture_core.config import param
 from texture_core.errors import InvalidParameter
-from texture_core.types import Array
 from texture_exploration.arms.arm import ArmCommand, ArmState, Vector
 
 # --------------------
 # Stability limit of the force control, predicted from the sampled loop.
 #
 # The contact integrates the velocity to a force, F' = −k·u; u is held for a period T and comes into effect after a
-# delay of (m + γ)·T, with a whole m and 0 ≤ γ < 1. With s = Σ e·T, the loop on the force error e is exactly
+# delay of (m + γ)·T, with a whole m and 0 ≤ γ < 1. The loop on the force error e is exactly
 #
-#     e[n+1] = e[n] + k·T·((1 − γ)·u[n−m] + γ·u[n−m−1]),    s[n+1] = s[n] + T·e[n+1],    u[n] = −g·(e[n] + s[n] / Ti),
+#     e[n+1] = e[n] + k·T·((1 − γ)·u[n−m] + γ·u[n−m−1]),    u[n] = −g·e[n],
 #
-# a linear map; it is stable if all its eigenvalues lie within the unit circle. Only the products g·k·T, delay / T and
-# Ti / T matter. Without the integral part and without sampling the stability limit is g·k·delay = π/2.
+# stable if all roots of zᵐ⁺² − zᵐ⁺¹ + g·k·T·((1 − γ)·z + γ) lie within the unit circle. The integral part is so slow
+# that it has no part in that. Without sampling the stability limit is g·k·delay = π/2.
 #
 # Source: Åström & Wittenmark, Computer-Controlled Systems, 1997, section 2.3 (sampling a system with delay).
 
 BISECTIONS = 40
 
 
-@dataclass(frozen=True)
-class LoopModel:
-    """Force control on a contact: stiffness k, gain g, delay, period T and time constant Ti of the integral part."""
-
-    stiffness_n_m: float
-    gain_m_s_n: float
-    delay_s: float
-    period_s: float
-    integral_s: float = math.inf
-
-
-def loop_matrix(loop: LoopModel) -> Array:
-    """Return the matrix of the loop; the state is e, s if there is an integral part, and m + 1 velocities."""
-    fraction, whole = math.modf(round(loop.delay_s / loop.period_s, 9))
-    waiting = int(whole) + 1
-    matrix = np.zeros((2 + waiting, 2 + waiting))
-    answer = np.zeros(2 + waiting)
-    answer[0], answer[1] = -loop.gain_m_s_n, -loop.gain_m_s_n / loop.integral_s
-    step = loop.stiffness_n_m * loop.period_s
-    error = np.zeros(2 + waiting)
-    error[0] = 1.0
-    error[1 + waiting] += step * fraction  # the oldest velocity
-    newer = answer if waiting == 1 else np.eye(2 + waiting)[waiting]
-    error += step * (1 - fraction) * newer
-    matrix[0] = error
-    matrix[1] = loop.period_s * error
-    matrix[1, 1] += 1.0
-    matrix[2] = answer
-    for place in range(3, 2 + waiting):
-        matrix[place, place - 1] = 1.0
-    return matrix if math.isfinite(loop.integral_s) else np.delete(np.delete(matrix, 1, axis=0), 1, axis=1)
-
-
-def spectral_radius(loop: LoopModel) -> float:
-    """Return the growth of a disturbance per period, the spectral radius; below 1 it decays."""
-    return float(np.abs(np.linalg.eigvals(loop_matrix(loop))).max())
+def spectral_radius(gain_m_s_n: float, stiffness_n_m: float, delay_s: float, period_s: float) -> float:
+    """Return the growth of a disturbance per period; below 1 it decays."""
+    fraction, whole = math.modf(round(delay_s / period_s, 9))
+    polynomial = np.zeros(int(whole) + 3)
+    polynomial[:2] = 1.0, -1.0
+    polynomial[-2:] += gain_m_s_n * stiffness_n_m * period_s * np.array([1.0 - fraction, fraction])
+    return float(np.abs(np.roots(polynomial)).max())
 
 
 @lru_cache(maxsize=4096)
-def stability_limit_gain(loop: LoopModel) -> float:
-    """Return the gain from which the loop is unstable, m/s/N, by its eigenvalues; `loop.gain` has no effect."""
-    return lowest_unstable_gain(loop, lambda gain: spectral_radius(replace(loop, gain_m_s_n=gain)) < 1.0)
-
-
-def lowest_unstable_gain(loop: LoopModel, stable: Callable[[float], bool], bisections: int = BISECTIONS) -> float:
-    """Return the lowest gain that is not stable, around that of the pure delay, π / 2 / (k · delay)."""
-    high = 2.5 / (loop.stiffness_n_m * loop.period_s)  # a pure integrator is stable up to 2 / (k·T)
-    # Far below, the integral part makes a slow oscillation that looks unstable in a short run.
-    low = 0.1 / (loop.stiffness_n_m * (loop.delay_s + loop.period_s))
-    for _ in range(bisections):
+def stability_limit_gain(stiffness_n_m: float, delay_s: float, period_s: float) -> float:
+    """Return the lowest gain with which the loop is unstable, m/s/N."""
+    high = 2.5 / (stiffness_n_m * period_s)  # a pure integrator is stable up to 2 / (k·T)
+    low = 0.1 / (stiffness_n_m * (delay_s + period_s))
+    for _ in range(BISECTIONS):
         middle = math.sqrt(low * high)
-        low, high = (middle, high) if stable(middle) else (low, middle)
+        stable = spectral_radius(middle, stiffness_n_m, delay_s, period_s) < 1.0
+        low, high = (middle, high) if stable else (low, middle)
     return low
 
 
@@ -137,7 +101,7 @@ class ForceLoopParams:
 
     def gain_m_s_n(self, period_s: float) -> float:
         """Return the gain, m/s/N: below the stability limit on the stiffest contact by the margin."""
-        return stability_limit_gain(LoopModel(self.max_stiffness_n_m, 0.0, self.loop_delay_s, period_s)) / GAIN_MARGIN
+        return stability_limit_gain(self.max_stiffness_n_m, self.loop_delay_s, period_s) / GAIN_MARGIN
 
     def integral_s(self, period_s: float) -> float:
         """Return the time constant of the integral part: many response times on the stiffest contact."""

@@ -292,7 +292,7 @@ class CrossLegs(Follower):
             PathFollower(StraightPath(leg_m, heading_rad + quarter), arm_lag_s) for quarter in (0.0, QUARTER_RAD)
         ]
         self._corner_m = math.inf  # where on the path the first leg ends; unknown until the slide begins
-        self._left_corner_s = math.nan  # until the arm is steady on the second leg; NaN on the first
+        self._turning_s = -math.inf  # since the corner began
         self._age_m = 0.0
         self._time_ns = 0
 
@@ -308,26 +308,26 @@ class CrossLegs(Follower):
     @property
     def steady_m(self) -> float:
         """The way left until the corner, none in it, and no limit on the second leg."""
-        if math.isnan(self._left_corner_s):
+        if self._turning_s < 0.0:
             left_m = self._corner_m - self.travelled_m - self._age_m - TURN_MARGIN_S * self._speed_m_s
             return max(0.0, left_m)
-        return 0.0 if self._left_corner_s > 0.0 else math.inf
+        return 0.0 if self._turning_s < self._corner_s + STEADY_S else math.inf
 
     def update(self, time_ns: int, arm: ArmState) -> None:
         """Update the position of the finger, and enter the corner at the end of the first leg."""
         passed_s = (time_ns - self._time_ns) * 1e-9
         self._time_ns = time_ns
         self._age_m = self._speed_m_s * max(0.0, (time_ns - arm.time_ns) * 1e-9)
-        if math.isnan(self._left_corner_s):
-            self._follow(self._legs[0], time_ns, arm)
-            if self.travelled_m + self._age_m >= self._corner_m:
-                self._left_corner_s = self._corner_s + STEADY_S
-            return
-        self._left_corner_s -= passed_s
-        if self._turned_rad < QUARTER_RAD:
+        self._turning_s += passed_s
+        if self._turning_s >= 0.0 and self._turned_rad < QUARTER_RAD:
             self.travelled_m += self._speed_m_s * passed_s
-        else:
-            self._follow(self._legs[1], time_ns, arm)
+            return
+        leg = self._legs[self._turning_s >= 0.0]
+        before_m = leg.travelled_m
+        leg.update(time_ns, arm)
+        self.travelled_m += leg.travelled_m - before_m
+        if self._turning_s < 0.0 and self.travelled_m + self._age_m >= self._corner_m:
+            self._turning_s = 0.0
 
     def velocity(self, speed_m_s: float) -> tuple[float, float]:
         """Return the velocity for a speed, m/s."""
@@ -340,12 +340,4 @@ class CrossLegs(Follower):
     @property
     def _turned_rad(self) -> float:
         """By how much the finger has turned, 0 to a quarter."""
-        if math.isnan(self._left_corner_s):
-            return 0.0
-        turning_s = self._corner_s + STEADY_S - self._left_corner_s
-        return QUARTER_RAD * smooth(turning_s / self._corner_s)
-
-    def _follow(self, leg: PathFollower, time_ns: int, arm: ArmState) -> None:
-        before_m = leg.travelled_m
-        leg.update(time_ns, arm)
-        self.travelled_m += leg.travelled_m - before_m
+        return QUARTER_RAD * smooth(self._turning_s / self._corner_s)

@@ -1,18 +1,18 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Limits of requests, of single commands, and of measured forces and positions."""
+"""Limits of requests, and of measured forces and positions."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 from texture_core.config import param
-from texture_core.errors import CommandRefused, ExplorationError, InvalidParameter, MotionRefused
+from texture_core.errors import ExplorationError, InvalidParameter, MotionRefused
 from texture_core.types import ExplorationRequest
-from texture_exploration.arms.arm import ArmCommand, ArmState, Vector
+from texture_exploration.arms.arm import ArmState, Vector
 
 # --------------------
 # Limits of requests and measurements.
@@ -207,48 +207,6 @@ class SafetyLimits:
             for at, (axis, (low, high)) in zip(position, self.workspace.items(), strict=True)
             if not low <= at <= high
         )
-
-
-# --------------------
-# Commands that an arm or a hand refuses from any program.
-
-
-@dataclass(frozen=True)
-class CommandLimits:
-    """Limits of every single command; a base of the parameters of each arm.
-
-    The explorer has tighter limits for requests. These also hold for programs that use an arm
-    without the explorer, and for a motion with an error in its arithmetic.
-    """
-
-    command_speed_m_s = 1.0  # along the surface, of a single command; four times the limit of an exploration
-    command_normal_m_s = 0.5  # along the normal, of a single command
-    command_force_n = 50.0  # of a single command; the limit of an exploration is not higher
-
-    def check(self, command: ArmCommand, stop: Callable[[], None] | None = None) -> None:
-        """Return if the command may be executed."""
-        reason = self._excess(command)
-        if not reason:
-            return
-        if stop is not None:
-            stop()
-        raise CommandRefused(f'the command was refused and the arm stopped: {reason}')
-
-    def _excess(self, command: ArmCommand) -> str:
-        # Written so that NaN also exceeds the limit.
-        speed = math.hypot(*command.tangential_m_s)
-        if not speed <= self.command_speed_m_s:
-            return _range('the speed along the surface', speed, 0.0, self.command_speed_m_s, 'm/s')
-        if not abs(command.normal_m_s) <= self.command_normal_m_s:
-            highest = self.command_normal_m_s
-            return _range('the speed along the normal', command.normal_m_s, -highest, highest, 'm/s')
-        if command.force_n is not None and not 0.0 <= command.force_n <= self.command_force_n:
-            return _range('the force', command.force_n, 0.0, self.command_force_n, 'N')
-        return ''
-
-
-def _range(what: str, value: float, low: float, high: float, unit: str) -> str:
-    return f'{what} is {value:g} {unit}; allowed is {low:g} to {high:g} {unit}'
 
 
 # --------------------

@@ -71,8 +71,6 @@ class TouchParams:
     peak_speed_fraction: float = param(
         0.5, 'Fraction by which a slide may exceed its speed for 50 ms and succeed.', low=0.05, high=20.0
     )
-    mean_friction = 2.0  # mean force along the surface by wanted force, of a slide that succeeds
-    peak_friction = 3.0  # the same for 50 ms; states beyond it are not steady
     lift_speed_m_s = 0.05  # away from the surface, once the direction of the normal is proven
     clearance_m = 0.005  # least rise after a contact
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 import math
 import statistics
 from collections import deque
-from collections.abc import Iterator
 from dataclasses import replace
 
 from texture_core.errors import ExplorationError, MotionAborted
@@ -68,7 +67,7 @@ class ContactWatch:
 # --------------------
 # Whether the finger moves along the surface as commanded, and whether the slide was as requested.
 
-PEAK_NS = 50_000_000  # averaging time of speed and tangential force: motors step, sensors are noisy
+PEAK_NS = 50_000_000  # averaging time of the speed: motors step
 FORCES = 3  # newest normal forces, of which the middle one counts: one alone may be wrong
 LONGEST_STEP_NS = 50_000_000  # a command that was given longer ago may have run out: the comparison starts again
 
@@ -123,10 +122,9 @@ class StallWatch:
 
 
 class SlideWatch:
-    """Compare mean and peak of speed, normal and tangential force of a slide with the request.
+    """Compare mean and peak of speed and normal force of a slide with the request.
 
-    The speed is that from place to place, where the path has a constant one: not in turns. The tangential force
-    counts where the arm measures it.
+    The speed is that from place to place, where the path has a constant one: not in turns.
     """
 
     def __init__(self, speed_m_s: float, force_n: float, touch: TouchParams) -> None:
@@ -138,9 +136,9 @@ class SlideWatch:
         self._forces: deque[float] = deque(maxlen=FORCES)
         self._chunk: ArmState | None = None  # where the present piece of the mean speed began
         self._way_m = self._way_s = 0.0
-        self._force_sum_n = self._tangential_sum_n = 0.0
-        self._states = self._tangential_states = 0
-        self._peaks = [0.0, 0.0, 0.0]  # normal force, speed, tangential force
+        self._force_sum_n, self._states = 0.0, 0
+        self._most = (1 + touch.peak_force_fraction) * force_n, (1 + touch.peak_speed_fraction) * speed_m_s
+        self._peaks = [0.0, 0.0]  # force and speed
 
     def update(self, arm: ArmState, constant: bool) -> bool:
         """Take a state; return whether it is within the tolerance of the request."""
@@ -150,9 +148,6 @@ class SlideWatch:
         self._states += 1
         self._force_sum_n += arm.force_n
         self._forces.append(arm.force_n)
-        if math.isfinite(arm.tangential_force_n):
-            self._tangential_states += 1
-            self._tangential_sum_n += abs(arm.tangential_force_n)
         if not (constant and 0 <= arm.time_ns - last_ns <= LONGEST_STEP_NS):  # below 0: a clock was set back
             self._recent.clear()
             self._chunk = None
@@ -161,57 +156,39 @@ class SlideWatch:
         while arm.time_ns - self._recent[0].time_ns > PEAK_NS:
             self._recent.popleft()
         self._add_way(arm)
-        now = [statistics.median(self._forces), self._fast_m_s(), self._tangential_n()]
+        now = [statistics.median(self._forces), self._fast_m_s()]
         self._peaks = [max(peak, value) for peak, value in zip(self._peaks, now, strict=True)]
         return all(value <= most for value, most in zip(now, self._most, strict=True))
 
     def flaw(self) -> str:
         """Return in a sentence the request and the measurement if they differ too much, '' if not."""
-        return '; '.join(self._differences())
-
-    @property
-    def _most(self) -> tuple[float, float, float]:
-        """Largest normal force, speed and tangential force for a moment."""
-        touch = self._touch
-        return (
-            (1 + touch.peak_force_fraction) * self._force_n,
-            (1 + touch.peak_speed_fraction) * self._speed_m_s,
-            touch.peak_friction * self._force_n,
-        )
-
-    def _differences(self) -> Iterator[str]:
+        flaws: list[str] = []
         touch, asked_n, asked_m_s = self._touch, self._force_n, self._speed_m_s
         mean_n = self._force_sum_n / max(1, self._states)
         if not abs(mean_n - asked_n) <= self._mean_force_fraction * asked_n:  # so NaN is none
-            yield (
+            flaws.append(
                 f'the mean force of the slide was {mean_n:.2f} N, more than {self._mean_force_fraction:.0%} off the '
                 f'{asked_n:g} N requested; slide more slowly, or check the force '
                 'control of the arm'
             )
         mean_m_s = self._way_m / self._way_s if self._way_s else asked_m_s
         if not abs(mean_m_s - asked_m_s) <= touch.mean_speed_fraction * asked_m_s:
-            yield (
+            flaws.append(
                 f'the mean speed of the slide was {mean_m_s:.4f} m/s, more than {touch.mean_speed_fraction:.0%} off '
                 f"the {asked_m_s:g} m/s requested ('mean_speed_fraction'); check what scales the speed of the "
                 'arm'
             )
-        mean_n = self._tangential_sum_n / max(1, self._tangential_states)
-        if mean_n > touch.mean_friction * asked_n:
-            yield (
-                f'the mean force along the surface was {mean_n:.2f} N, and {touch.mean_friction * asked_n:.2f} N are '
-                f'allowed with {asked_n:g} N requested; check whether the finger catches on something'
-            )
         measured = (
-            ('force', 'N', f'{asked_n:g} N', 'peak_force_fraction'),
-            ('speed', 'm/s', f'{asked_m_s:g} m/s', 'peak_speed_fraction'),
-            ('force along the surface', 'N', f'a force of {asked_n:g} N', ''),
+            ('force', 'N', asked_n, 'peak_force_fraction'),
+            ('speed', 'm/s', asked_m_s, 'peak_speed_fraction'),
         )
         for (what, unit, asked, parameter), peak, most in zip(measured, self._peaks, self._most, strict=True):
             if not peak <= most:
-                yield (
+                flaws.append(
                     f'the {what} of the slide reached {peak:.3g} {unit}, and {most:.3g} {unit} are allowed with '
-                    f'{asked} requested' + (f" ('{parameter}')" if parameter else '')
+                    f"{asked:g} {unit} requested ('{parameter}')"
                 )
+        return '; '.join(flaws)
 
     def _add_way(self, arm: ArmState) -> None:
         """Sum the distance in pieces of PEAK_NS: noise of the position makes shorter ones too long."""
@@ -227,10 +204,6 @@ class SlideWatch:
         first, last = self._recent[0], self._recent[-1]
         took_s = (last.time_ns - first.time_ns) * 1e-9
         return math.dist(first.position[:2], last.position[:2]) / took_s if took_s >= 0.6e-9 * PEAK_NS else 0.0
-
-    def _tangential_n(self) -> float:
-        known = [abs(arm.tangential_force_n) for arm in self._recent if math.isfinite(arm.tangential_force_n)]
-        return statistics.fmean(known) if len(known) >= FORCES else 0.0
 
 
 # --------------------

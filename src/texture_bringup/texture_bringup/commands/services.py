@@ -38,11 +38,6 @@ stop = trigger(
 )
 recover = trigger('free the arm from a fault', 'explorer/recover')
 lift = trigger('lift a finger that was left pressed on the surface', 'explorer/lift')
-reboot = trigger(
-    'reboot the motors of a hand',
-    'explorer/reboot',
-    "only the launch file 'hand' offers it; start that, or give its --namespace",
-)
 touch_surface = trigger('take one touch of the surface calibration', 'explorer/touch_surface', TOUCHES_MISSING)
 forget_touches = trigger('restart the touches of the surface calibration', 'explorer/forget_touches', TOUCHES_MISSING)
 tare = trigger(

@@ -15,7 +15,7 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -86,6 +86,26 @@ class ArmCommand:
 
 STANDSTILL = ArmCommand()
 
+# Of a single command from any program; the explorer has tighter limits for requests.
+MOST_COMMAND_M_S = 1.0  # along the surface: four times the limit of an exploration
+MOST_NORMAL_COMMAND_M_S = 0.5
+MOST_COMMAND_N = 50.0  # the limit of an exploration is not higher
+
+
+def check_command(command: ArmCommand, stop: Callable[[], object]) -> None:
+    """Stop the arm and raise CommandRefused if a command is out of range."""
+    for what, value, low, high, unit in (
+        ('the speed along the surface', math.hypot(*command.tangential_m_s), 0.0, MOST_COMMAND_M_S, 'm/s'),
+        ('the speed along the normal', command.normal_m_s, -MOST_NORMAL_COMMAND_M_S, MOST_NORMAL_COMMAND_M_S, 'm/s'),
+        ('the force', 0.0 if command.force_n is None else command.force_n, 0.0, MOST_COMMAND_N, 'N'),
+    ):
+        if not low <= value <= high:  # so is NaN
+            stop()
+            raise CommandRefused(
+                f'the command was refused and the arm stopped: {what} is {value:g} {unit}; allowed is {low:g} to '
+                f'{high:g} {unit}'
+            )
+
 
 class Arm:
     """An arm under hybrid control: velocity along the surface, velocity or force along its normal; a base of all arms.
@@ -97,7 +117,6 @@ class Arm:
 
     Params: type[Any]
     noisy_force = False  # its measured force is never twice the same to the last bit, as that of a sensor with noise
-    reboots = False
     keeps_start = False  # nothing else moves it: explorations begin at the same place after a release
 
     def __init__(self, params: Any) -> None:
@@ -132,12 +151,7 @@ class Arm:
             self.close()
 
     def recover(self) -> None:
-        """Recover from a fault without a new connection; the caller makes sure that the arm may move."""
-        raise DeviceError('this arm recovers from a fault only when it is connected again')
-
-    def reboot(self) -> str:
-        """Release the arm, reboot the motors that report an error, stay unconnected; return what was done."""
-        raise DeviceError('this arm has no motors that could be rebooted; use recover')
+        """Release what the robot itself holds, such as a protective stop, before it is connected again."""
 
     def warning(self) -> str:
         """Return a warning in a sentence although the arm moves, '' if there is none."""
@@ -147,11 +161,6 @@ class Arm:
     def zeroed(self) -> bool:
         """Whether the force is a measure of contact: not before an arm that zeroes its sensor itself has done so."""
         return True
-
-    @property
-    def counts(self) -> Mapping[str, int]:
-        """Totals for the operator, by name; DeviceError if the arm is not connected."""
-        return {}
 
     @property
     def base_frame_id(self) -> str:
@@ -258,7 +267,7 @@ class SurfaceArm(Arm):
 
     def _check(self, command: ArmCommand) -> None:
         """Refuse a command that is out of range, or has a force before the force sensor is zeroed; the arm stops."""
-        self._params.check(command, self.stop)
+        check_command(command, self.stop)
         if command.force_n is not None and not self.zeroed and not self.state().fault:
             self.stop()
             raise CommandRefused(
@@ -314,20 +323,27 @@ def claim(resource: str, patience_s: float) -> int:
         raise DeviceError(
             f"the lock '{path}' of the arm cannot be opened ({error}); see that the folder exists"
         ) from error
+    try:
+        lock_within(lock, patience_s)
+    except BlockingIOError as error:
+        raise DeviceError(
+            f'another process on this machine commands the arm ({resource}), or its guard still stops it: '
+            f"it holds '{path}', and fuser names the process; end it first"
+        ) from error
+    return lock
+
+
+def lock_within(descriptor: int, patience_s: float) -> None:
+    """Lock an open file; if another process holds it for longer, close it and raise BlockingIOError."""
     end_s = time.monotonic() + patience_s
     while True:
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            if time.monotonic() < end_s and not ENDING.is_set():
-                time.sleep(0.02)
-                continue
-            os.close(lock)
-            raise DeviceError(
-                f'another process on this machine commands the arm ({resource}), or its guard still stops it: '
-                f"it holds '{path}', and fuser names the process; end it first"
-            ) from error
-        return lock
+            return fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if time.monotonic() > end_s or ENDING.is_set():
+                os.close(descriptor)
+                raise
+        time.sleep(0.02)
 
 
 class GuardProcess:

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import functools
 import importlib
 import math
@@ -14,17 +13,24 @@ import sys
 import termios
 import threading
 import time
-from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import serial
 
 from texture_core.errors import CommandRefused, DeviceError
-from texture_exploration.arms.arm import DONE, STANDSTILL, ArmCommand, GuardProcess, guard_socket
+from texture_exploration.arms.arm import (
+    DONE,
+    STANDSTILL,
+    ArmCommand,
+    GuardProcess,
+    check_command,
+    guard_socket,
+    lock_within,
+)
 from texture_exploration.arms.hand import (
     POSITION_RAD,
+    ROLES,
     VELOCITY_RAD_S,
     X_SERIES,
     ZERO,
@@ -37,7 +43,6 @@ from texture_exploration.arms.hand import (
     goes_on,
     load_profile,
 )
-from texture_exploration.safety import CommandLimits
 
 # --------------------
 # Motors on a Dynamixel bus, in physical units, through the unmodified dynamixel-sdk.
@@ -60,10 +65,11 @@ OPERATING_MODE = 5  # current-based position: in any other the current does not 
 FIRMWARE = 6  # address of its version, of one byte, in all control tables of protocol 2.0
 TRIPPED = 0xFF  # the register of the Bus Watchdog after it has stopped the motor
 RESTART_S = 3.0  # a motor has rebooted within
+LOCKED_S = 1.0  # the guard of a killed process has released the motors within
 SILENT = 'does not answer'
 GARBLED = 'answers with data that cannot be read: do two motors have this id, or is the cable damaged?'
 RESET = 'has lost its torque: it was reset, for example by a voltage drop'
-REMEDY = "; when it has cooled and nothing blocks it, reboot it (service '~/reboot') or switch its power off and on"
+REMEDY = '; when it has cooled and nothing blocks it, call `texture recover`, or switch its power off and on'
 HARDWARE_ERRORS = {0: 'input voltage', 2: 'overheating', 3: 'encoder', 4: 'electrical shock', 5: 'overload'}
 
 
@@ -73,21 +79,6 @@ class MotorState(NamedTuple):
     current_a: float
     velocity_rad_s: float
     position_rad: float
-
-
-def _locked(device: str) -> int:
-    """Return a descriptor that holds a lock on a device; OSError if another program has it.
-
-    Two programs on one bus would read each other's answers and release each other's motors. The SDK empties the input
-    buffer when it opens the port, with answers to another program; so the lock is taken before.
-    """
-    descriptor = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        os.close(descriptor)
-        raise
-    return descriptor
 
 
 class DynamixelBus:
@@ -113,7 +104,11 @@ class DynamixelBus:
         self._port: Any = self._sdk.PortHandler(device)
         self._packets: Any = self._sdk.PacketHandler(PROTOCOL)
         with self._line(), contextlib.ExitStack() as on_error:
-            self.lock = _locked(device)
+            # Two programs on one bus would read each other's answers and release each other's motors. The SDK empties
+            # the input buffer when it opens the port, with answers to another program; so the lock is taken before.
+            lock = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+            lock_within(lock, LOCKED_S)
+            self.lock = lock
             on_error.callback(self.close)
             opened = self._port.openPort() and self._port.setBaudRate(profile.baud)
             if opened:
@@ -216,26 +211,16 @@ class DynamixelBus:
                 f"force is not armed; update its firmware, or correct the table of the profile '{self._profile.name}'"
             )
 
-    def reboot(self) -> list[int]:
-        """Reboot the motors that report a hardware error, all without torque; return which."""
+    def reboot(self) -> None:
+        """Reboot the motors that report a hardware error, all without torque, and wait until they have restarted."""
         self.torque_off(self._profile.ids)
         latched = [motor for motor in self._profile.ids if self.read_register(motor, 'hardware_error')]
         for motor in latched:
             with self._line():
                 self._packets.reboot(self._port, motor)
-        for motor in latched:
-            self._wait_for_restart(motor)
-        return latched
-
-    def _wait_for_restart(self, motor: int) -> None:
-        end_s = time.monotonic() + RESTART_S
-        while (bits := self.read_register(motor, 'hardware_error')) != 0:
-            if time.monotonic() > end_s:
-                found = f'still reports {_reasons(bits)}' if bits else SILENT
-                raise DeviceError(
-                    f'{self._profile.owner(motor)} {found} after a reboot; let it cool, look for what blocks it, and '
-                    'switch its power off and on'
-                )
+        end_s = time.monotonic() + RESTART_S  # an error that stays is named by the next connection
+        while time.monotonic() < end_s and any(self.read_register(motor, 'hardware_error') != 0 for motor in latched):
+            pass
 
     def read(self) -> dict[int, MotorState]:
         """Return the measurements of all motors, {} if a cycle is lost; a silent motor is moved to `missing`."""
@@ -458,9 +443,6 @@ CLOSING_M_S = 0.02  # speed of a finger that comes down to press
 REACH_RAD = 0.3  # largest depth of the goal of a pressing motor within the object
 SLACK_RAD = 0.2  # largest distance between the goal and a blocked motor
 LONGEST_STEP_S = 0.05
-RATE_CYCLES = 40  # over which the rate is measured
-SLOW_FRACTION = 0.7  # of the rate of the profile, below which a warning is given
-LIMITS = CommandLimits()
 NOT_CONNECTED = 'the hand is not connected; connect it first'
 
 
@@ -473,15 +455,14 @@ class DynamixelHand:
     motors stops them.
     """
 
-    def __init__(self, profile: str, device: str, limits: CommandLimits = LIMITS) -> None:
+    def __init__(self, profile: str, device: str) -> None:
         self.profile: Profile = load_profile(profile)
         self.finger_sets: Mapping[str, FingerSet] = self.profile.finger_sets
         self._device = device
-        self._limits = limits
         self._fingers = {name: DynamixelFinger(joints, self.profile) for name, joints in self.profile.fingers.items()}
         self._state: HandState | None = None
         self._failure = NOT_CONNECTED
-        self._doubt = self._slow = ''
+        self._doubt = ''
         self._highest_a: Mapping[int, float] = {}
         self._grip: Mapping[str, float] = {}
         self._commands: dict[str, tuple[ArmCommand, float]] = {}
@@ -494,7 +475,7 @@ class DynamixelHand:
         self.close()
         self._closing.clear()
         self._fresh.clear()
-        self._failure = self._doubt = self._slow = ''
+        self._failure = self._doubt = ''
         self._thread = threading.Thread(target=self._run, name='dynamixel', daemon=True)
         self._thread.start()
         if not self._fresh.wait(FIRST_STATE_S) or self._failure:
@@ -519,7 +500,7 @@ class DynamixelHand:
 
     def warning(self) -> str:
         """Return what is not as it should be although the hand moves, '' if nothing."""
-        return '; '.join(filter(None, (self._doubt, self._slow)))
+        return self._doubt
 
     def grip(self, forces_n: Mapping[str, float]) -> None:
         """Press from the next cycle on."""
@@ -535,18 +516,14 @@ class DynamixelHand:
             self._check(name, command)
         self._command_motors(fingers, command)
 
-    def reboot(self) -> str:
-        """Release, reboot the motors that report a hardware error, and stay unconnected; return what was done."""
+    def reboot(self) -> None:
+        """Release, reboot the motors that report a hardware error, and stay unconnected."""
         self.close()
         bus = DynamixelBus(self._device, self.profile)
         try:
-            rebooted = bus.reboot()
+            bus.reboot()
         finally:
             bus.close()
-        self._failure = NOT_CONNECTED
-        if not rebooted:
-            return 'no motor that answers reports an error; none was rebooted, and the hand was released'
-        return f'rebooted: {", ".join(map(self.profile.owner, rebooted))}; released until the next request'
 
     def _command_motors(self, fingers: Sequence[str], command: ArmCommand) -> None:
         for name in fingers:
@@ -554,19 +531,16 @@ class DynamixelHand:
 
     def _check(self, name: str, command: ArmCommand) -> None:
         """Refuse a command beyond its limits or beyond the current of the motor."""
-        self._limits.check(command, lambda: self._command_motors([name], STANDSTILL))
-        highest_n = self._highest_n(name)
+        check_command(command, lambda: self._command_motors([name], STANDSTILL))
+        joint, profile = self.profile.fingers[name]['press'], self.profile
+        highest_a = self._highest_a.get(joint.id, math.inf)
+        highest_n = (highest_a - profile.idle_a) * profile.torque_nm_a / abs(joint.lever_m)
         if command.force_n is not None and command.force_n > highest_n:
             self._command_motors([name], STANDSTILL)
             raise CommandRefused(
                 f'the command was refused and {name} stopped: the force is {command.force_n:g} N, and the Current '
                 f'Limit of its motor allows {highest_n:.3g} N; ask for less, or raise that limit with DYNAMIXEL Wizard'
             )
-
-    def _highest_n(self, name: str) -> float:
-        joint = self.profile.fingers[name]['press']
-        highest_a = self._highest_a.get(joint.id, math.inf)
-        return (highest_a - self.profile.idle_a) * self.profile.torque_nm_a / abs(joint.lever_m)
 
     def _run(self) -> None:
         bus = guard = None
@@ -600,23 +574,19 @@ class DynamixelHand:
             finger.restart()
         now_s = stepped_s = time.monotonic()
         errors: dict[str, None] = {}
-        cycles: deque[float] = deque(maxlen=RATE_CYCLES)
         while not self._closing.wait(max(0.0, now_s + period_s - time.monotonic())):
             now_s = time.monotonic()
             motors = bus.read()
             if not motors:
                 if bus.missing and self._fresh.is_set():
-                    self._publish(self._fault(bus, errors))  # at once: before the others have been read again
+                    self._publish(bus, errors)  # at once: before the others have been read again
                 continue
             if error := bus.check_next():
                 errors[error] = None
             goals = self._step(motors, min(LONGEST_STEP_S, now_s - stepped_s), now_s)
             stepped_s = now_s
-            self._publish(self._fault(bus, errors))
+            self._publish(bus, errors)
             bus.write_goals(goals)
-            cycles.append(now_s)
-            if len(cycles) == RATE_CYCLES:
-                self._slow = self._slowness((RATE_CYCLES - 1) / (cycles[-1] - cycles[0]))
 
     def _doubtful(self, deaf: Iterable[int]) -> str:
         """Return a warning about motors whose watchdog may not stop them, '' if there are none."""
@@ -626,18 +596,6 @@ class DynamixelHand:
         return (
             f'the watchdog of motors {numbers} may not stop them when the cable is out or the computer hangs: their '
             'firmware is known to go on; update it with DYNAMIXEL Wizard'
-        )
-
-    def _slowness(self, rate_hz: float) -> str:
-        """Return a warning about the rate of the bus, '' if it is fast enough."""
-        if rate_hz >= SLOW_FRACTION * self.profile.rate_hz:
-            return ''
-        latency = Path(f'/sys/class/tty/{Path(self._device).resolve().name}/device/latency_timer')  # adapters by FTDI
-        now = f' (now {latency.read_text().strip()} ms)' if latency.is_file() else ''
-        return (
-            f'the bus makes {rate_hz:.0f} of {self.profile.rate_hz:g} cycles a second: set the latency timer of the '
-            f"USB adapter to 1 ms{now}, raise the baud rate ({self.profile.baud}) or lower 'rate_hz' of the profile "
-            f"'{self.profile.name}'"
         )
 
     def _step(self, motors: Mapping[int, MotorState], dt_s: float, now_s: float) -> dict[int, tuple[float, float]]:
@@ -652,10 +610,8 @@ class DynamixelHand:
             goals.update(finger.goals(command, dt_s))
         return goals
 
-    def _fault(self, bus: DynamixelBus, errors: Iterable[str]) -> str:
-        return '; '.join(dict.fromkeys([*map(bus.why_missing, sorted(bus.missing)), *errors]))
-
-    def _publish(self, fault: str) -> None:
+    def _publish(self, bus: DynamixelBus, errors: Iterable[str]) -> None:
+        fault = '; '.join(dict.fromkeys([*map(bus.why_missing, sorted(bus.missing)), *errors]))
         tips = {name: finger.tip for name, finger in self._fingers.items()}
         self._state = HandState(time.monotonic_ns(), tips, fault)
         self._fresh.set()
@@ -691,9 +647,13 @@ class DynamixelFinger:
     @property
     def tip(self) -> Fingertip:
         """Place, speed and force."""
-        x, y, depth = (self._travel_m(role) for role in ('across', 'along', 'press'))
-        vx, vy, down = (self._speed(role) for role in ('across', 'along', 'press'))
-        return Fingertip((x, y, self._profile.start_height_m - depth), (vx, vy, -down), self._force_n())
+        ways, speeds = dict.fromkeys(ROLES, 0.0), dict.fromkeys(ROLES, 0.0)
+        for role, motor in self._motors.items():
+            lever_m = self._joints[role].lever_m
+            ways[role] = (motor.position_rad - self._start[role]) * lever_m
+            speeds[role] = motor.velocity_rad_s * lever_m
+        place = (ways['across'], ways['along'], self._profile.start_height_m - ways['press'])
+        return Fingertip(place, (speeds['across'], speeds['along'], -speeds['press']), self._force_n())
 
     def goals(self, command: ArmCommand, dt_s: float) -> dict[int, tuple[float, float]]:
         """Return highest current and position for each motor."""
@@ -727,14 +687,6 @@ class DynamixelFinger:
     def _advance(self, role: str, angle_rad: float, max_lead_rad: float) -> None:
         at = self._motors[role].position_rad
         self._goal[role] = min(at + max_lead_rad, max(at - max_lead_rad, self._goal[role] + angle_rad))
-
-    def _travel_m(self, role: str) -> float:
-        if role not in self._motors:
-            return 0.0
-        return (self._motors[role].position_rad - self._start[role]) * self._joints[role].lever_m
-
-    def _speed(self, role: str) -> float:
-        return self._motors[role].velocity_rad_s * self._joints[role].lever_m if role in self._motors else 0.0
 
     def _force_n(self) -> float:
         if 'press' not in self._motors:

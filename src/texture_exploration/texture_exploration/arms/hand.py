@@ -1,20 +1,16 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Hands: states, finger sets, profiles and models of force, and a simulated hand."""
+"""Hands of Dynamixel motors: states, finger sets, profiles and models of force."""
 
 from __future__ import annotations
 
-import threading
-import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, get_type_hints
 
 from texture_core.config import find_file, load_yaml, unknown_name
-from texture_core.errors import DeviceError, InvalidParameter, TextureError
-from texture_exploration.arms.arm import ArmCommand, Vector
-from texture_exploration.arms.simulated import RATE_HZ, SimulatedArm, SimulatedArmParams
-from texture_exploration.safety import CommandLimits
+from texture_core.errors import InvalidParameter, TextureError
+from texture_exploration.arms.arm import Vector
 
 # --------------------
 # Dynamixel models by number: current per count, and torque per current.
@@ -73,7 +69,7 @@ def describe(model: int) -> str:
 
 
 # --------------------
-# What every hand has: it holds with some fingers, and moves others as an arm does.
+# The state of a hand, which holds with some fingers and moves others as an arm does.
 
 
 class Fingertip(NamedTuple):
@@ -251,103 +247,3 @@ def _joints(roles: Mapping[str, Any], where: str) -> dict[str, Joint]:
     if 'press' not in roles:
         raise InvalidParameter(f"{where}: no motor for 'press'; every finger needs one")
     return {role: Joint(int(one['id']), float(one['lever_m'])) for role, one in roles.items()}
-
-
-# --------------------
-# A hand without a robot: five simulated fingers around an elastic object.
-
-FINGERS = ('thumb', 'index', 'middle', 'ring', 'little')
-# Kaboli et al. 2015: which fingers held and which slid, for learning and for testing.
-FINGER_SETS = {
-    'kaboli-train': FingerSet(hold=('thumb', 'little', 'ring'), slide=('index', 'middle')),
-    'kaboli-test': FingerSet(hold=('little', 'ring', 'middle'), slide=('thumb', 'index')),
-}
-START_M = 0.004
-LIMITS = CommandLimits()
-
-
-class SimulatedHand:
-    """Each finger is a separate simulated arm; methods as of `texture_exploration.arms.dynamixel.DynamixelHand`."""
-
-    finger_sets: Mapping[str, FingerSet] = FINGER_SETS
-
-    def __init__(
-        self,
-        clock: Callable[[], int] = time.monotonic_ns,
-        own_thread: bool = True,
-        limits: CommandLimits = LIMITS,
-    ) -> None:
-        params = SimulatedArmParams(start_height_m=START_M)
-        self.fingers = {name: SimulatedArm(params, clock, own_thread=False) for name in FINGERS}
-        self._clock = clock
-        self._limits = limits
-        self._own_thread = own_thread
-        self._grip: dict[str, ArmCommand] = {}
-        self._closing = threading.Event()
-        self._thread: threading.Thread | None = None
-
-    def connect(self) -> None:
-        """Start to move in time."""
-        self.close()
-        self._closing.clear()
-        for finger in self.fingers.values():
-            finger.connect()
-        if self._own_thread:
-            self._thread = threading.Thread(target=self._run, name='simulated_hand', daemon=True)
-            self._thread.start()
-
-    def close(self) -> None:
-        """Release and end the thread."""
-        self._grip = {}
-        self._closing.set()
-        if self._thread is not None:
-            self._thread.join()
-            self._thread = None
-        for finger in self.fingers.values():
-            finger.close()
-
-    def state(self) -> HandState:
-        """Return the newest state."""
-        states = {name: finger.state() for name, finger in self.fingers.items()}
-        tips = {name: Fingertip(one.position, one.velocity, one.force_n) for name, one in states.items()}
-        return HandState(
-            min(one.time_ns for one in states.values()), tips, '; '.join(s.fault for s in states.values() if s.fault)
-        )
-
-    def grip(self, forces_n: Mapping[str, float]) -> None:
-        """Press from the next step on."""
-        grip = {name: ArmCommand(force_n=force) for name, force in forces_n.items()}
-        for command in grip.values():
-            self._limits.check(command)
-        self._grip = grip
-
-    def command(self, fingers: Sequence[str], command: ArmCommand) -> None:
-        """Follow from the next step on."""
-        self._limits.check(command, lambda: self._send(fingers, ArmCommand()))
-        self._send(fingers, command)
-
-    def warning(self) -> str:
-        """Return no warning: `state` reports all faults."""
-        return ''
-
-    def reboot(self) -> str:
-        """Refuse."""
-        raise DeviceError('a simulated hand has no motors that could be rebooted')
-
-    def _send(self, fingers: Sequence[str], command: ArmCommand) -> None:
-        for name in fingers:
-            self.fingers[name].command(command)
-
-    def step(self, dt_s: float) -> None:
-        """Move all fingers."""
-        for name, command in self._grip.items():
-            self.fingers[name].command(command)
-        for finger in self.fingers.values():
-            finger.step(dt_s)
-
-    def _run(self) -> None:
-        last_ns = self._clock()
-        while not self._closing.wait(1 / RATE_HZ):
-            now_ns = self._clock()
-            self.step((now_ns - last_ns) * 1e-9)
-            last_ns = now_ns

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from texture_core.config import find, param
@@ -13,8 +13,7 @@ from texture_core.errors import DeviceError
 from texture_core.types import DEVICES
 from texture_exploration.arms.arm import Arm, ArmCommand, ArmState, Vector
 from texture_exploration.arms.dynamixel import DynamixelHand
-from texture_exploration.arms.hand import FingerSet, Fingertip, SimulatedHand
-from texture_exploration.safety import CommandLimits
+from texture_exploration.arms.hand import FingerSet, Fingertip
 
 HELD_FRACTION = 0.8  # of the wanted force: a finger that presses with it holds the object
 LOST_FRACTION = 0.5  # one that presses less has lost it
@@ -22,24 +21,16 @@ SAMPLE_PERIOD_S = 0.01
 
 
 @dataclass(frozen=True)
-class InHandParams(CommandLimits):
+class InHandParams:
     """Parameters of the hand and of its grip."""
 
-    hand: str = param('simulated', "Hand that is used: 'simulated' or 'dynamixel'.", choices=('simulated', 'dynamixel'))
     finger_set: str = param('kaboli-train', 'Finger set of the hand: which fingers hold and which slide.')
     grip_force_n: float = param(2.0, 'Force with which each holding finger presses.', unit='N', low=0.1, high=20.0)
     grip_timeout_s: float = param(
         3.0, 'How long the fingers may take to grip the object before connecting fails.', unit='s', low=0.1, high=30.0
     )
-    profile: str = param('leap', 'Profile of a Dynamixel hand: the name of a shipped one or the path of a file.')
-    device: str = param(f'{DEVICES}/dynamixel', 'Path of the serial device of a Dynamixel hand.')
-
-
-Hand = DynamixelHand | SimulatedHand
-HANDS: Mapping[str, Callable[[InHandParams], Hand]] = {
-    'simulated': lambda params: SimulatedHand(limits=params),
-    'dynamixel': lambda params: DynamixelHand(params.profile, params.device, params),
-}
+    profile: str = param('leap', 'Profile of the hand: the name of a shipped one or the path of a file.')
+    device: str = param(f'{DEVICES}/dynamixel', 'Path of the serial device of the hand.')
 
 
 class InHandArm(Arm):
@@ -50,11 +41,10 @@ class InHandArm(Arm):
     """
 
     Params = InHandParams
-    reboots = True
 
-    def __init__(self, params: InHandParams = InHandParams(), hand: Hand | None = None) -> None:
+    def __init__(self, params: InHandParams = InHandParams()) -> None:
         self._params = params
-        self.hand = hand or HANDS[params.hand](params)
+        self.hand = DynamixelHand(params.profile, params.device)
         self.fingers: FingerSet = find(self.hand.finger_sets, params.finger_set, 'finger set')
 
     def connect(self) -> None:
@@ -110,16 +100,9 @@ class InHandArm(Arm):
         """Return what is not as it should be although the hand moves, '' if nothing."""
         return self.hand.warning()
 
-    def reboot(self) -> str:
-        """Release the object and reboot the motors that report an error; the arm is not connected any more.
-
-        Raises
-        ------
-        DeviceError
-            If the hand has no motors that can be rebooted.
-        """
-        self.close()
-        return self.hand.reboot()
+    def recover(self) -> None:
+        """Release the object and reboot the motors that report an error."""
+        self.hand.reboot()
 
     def _take_hold(self) -> None:
         self.hand.grip(dict.fromkeys(self.fingers.hold, self._params.grip_force_n))

@@ -9,7 +9,7 @@ import termios
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from struct import Struct
 
@@ -19,8 +19,7 @@ from texture_core.config import param
 from texture_core.errors import DeviceError
 from texture_core.framing import Frame, FrameDecoder, pack
 from texture_core.types import DEVICES
-from texture_exploration.arms.arm import Arm, ArmCommand, ArmState, Vector
-from texture_exploration.safety import CommandLimits
+from texture_exploration.arms.arm import Arm, ArmCommand, ArmState, Vector, check_command
 
 # --------------------
 # Numbers of the rails and of the line to their microcontroller: the machine of Hu et al. 2014, frames of this project.
@@ -64,7 +63,7 @@ READ_S = 0.05
 
 
 @dataclass(frozen=True)
-class RailsParams(CommandLimits):
+class RailsParams:
     """Device of the rails, and the scale of their encoders."""
 
     device: str = param(f'{DEVICES}/rails', 'Path of the serial device of the rails; the default is the emulated one.')
@@ -95,7 +94,6 @@ class RailsArm(Arm):
         self._sent = 0
         self._states: deque[tuple[int, Vector]] = deque(maxlen=SPEED_OVER)  # device time in µs, and place
         self._state: ArmState | None = None
-        self._watchdog_stops = 0
 
     def connect(self) -> None:
         """Open the line, clear faults and wait for the first state.
@@ -156,7 +154,7 @@ class RailsArm(Arm):
 
     def command(self, command: ArmCommand) -> None:
         """Send a command."""
-        self._params.check(command, self.stop)
+        check_command(command, self.stop)
         vx, vy = (round(speed * MICRO) for speed in command.tangential_m_s)
         mode, value = MOVING, round(command.normal_m_s * MICRO)
         if command.force_n is not None:
@@ -168,16 +166,6 @@ class RailsArm(Arm):
     def stop(self) -> None:
         """Stop the rails; the pressing motor locks."""
         self._send(STOP)
-
-    @property
-    def counts(self) -> Mapping[str, int]:
-        """Totals: states taken, damaged or lost on the line, and stops of the watchdog."""
-        return {
-            'states': self._deframer.frames,
-            'bad_frames': self._deframer.bad_frames,
-            'lost_frames': self._deframer.lost,
-            'watchdog_stops': self._watchdog_stops,
-        }
 
     def _send(self, kind: int, body: bytes = b'') -> None:
         if self._failure or self._port is None:
@@ -206,7 +194,7 @@ class RailsArm(Arm):
                 'or this package'
             )
             return
-        x, y, z, force_mn, flags, self._watchdog_stops = STATE_BODY.unpack(frame.body)
+        x, y, z, force_mn, flags, _watchdog_stops = STATE_BODY.unpack(frame.body)
         per_m, params = self._params.xy_counts_m, self._params
         place: Vector = (x / per_m, y / per_m, params.height_m + z / params.z_counts_m)
         self._states.append((frame.time_us, place))

@@ -12,7 +12,7 @@ import importlib
 import logging
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Protocol
 
@@ -107,10 +107,6 @@ class RosControllersArm(SurfaceArm):
     Params = RosControllersParams
     noisy_force = True
     _params: RosControllersParams
-    _state: ArmState
-    _command: tuple[ArmCommand, int] | None  # and when it came
-    _commanded: Vector
-    _sent_ns: int
 
     def __init__(
         self,
@@ -127,6 +123,22 @@ class RosControllersArm(SurfaceArm):
         self._thread: threading.Thread | None = None
         self._closing = threading.Event()
         self._restart()
+
+    def _restart(self) -> None:
+        params = self._params
+        loop = replace(params, loop_delay_s=min(0.1, params.loop_delay_s + params.force_smoothing_s))
+        self._tool = ToolState(params)
+        self._loop = ForceLoop(loop, 1.0 / params.rate_hz)
+        self._follow = FollowWatch()
+        self._state = self._tool.state('')
+        self._command: tuple[ArmCommand, int] | None = None  # and when it came
+        self._commanded: Vector = REST
+        self._sent_ns = self._gone_ns = self._halted_ns = 0
+        self._zeroed = False
+        self._resting_first = True
+        self._unsafe = ''  # why it may only be lifted, until it is connected again
+        self._lost = ''  # a fault that stays as long
+        self._failed = ''  # with an internal error
 
     def check(self) -> None:
         """Wait for the first pose, the first force and a controller that subscribes; nothing is commanded.
@@ -188,7 +200,7 @@ class RosControllersArm(SurfaceArm):
         ------
         CommandRefused
             If a number is not finite or out of its range, or a force is wanted before the force sensor was zeroed since
-            the arm was connected, recovered or in a fault; the arm stops.
+            the arm was connected or in a fault; the arm stops.
         DeviceError
             If the arm is not connected.
         """
@@ -200,26 +212,6 @@ class RosControllersArm(SurfaceArm):
         """Command zero velocity from the next period on."""
         self._command = None
 
-    def recover(self) -> None:
-        """Clear a fault; the force sensor is zeroed again before the next contact.
-
-        The caller makes sure that the arm may move.
-
-        Raises
-        ------
-        DeviceError
-            If the fault is still there.
-        """
-        self._connected()
-        self.stop()
-        self._lost = self._unsafe = self._failed = self._tool.misplaced = self._tool.garbled = ''
-        self._tool.zero.forget()
-        self._zeroed = False
-        self._follow.restart()
-        self._let_rest()
-        if fault := self._fault(self._clock()) or self._connected().unsafe():
-            raise DeviceError(f'the arm did not recover: {fault}')
-
     @property
     def base_frame_id(self) -> str:
         """Name of the base frame on tf."""
@@ -227,14 +219,8 @@ class RosControllersArm(SurfaceArm):
 
     @property
     def zeroed(self) -> bool:
-        """Whether the force sensor was zeroed since the arm was connected or recovered."""
+        """Whether the force sensor was zeroed since the arm was connected."""
         return self._zeroed
-
-    @property
-    def counts(self) -> Mapping[str, int]:
-        """Totals of this connection."""
-        self._connected()
-        return {'zeroed': self._tool.zero.zeroings}
 
     def step(self) -> None:
         """Take what was measured, and send what the newest command needs now; zero velocity if that fails.
@@ -288,22 +274,6 @@ class RosControllersArm(SurfaceArm):
             topics.close()
             raise
         return topics
-
-    def _restart(self) -> None:
-        params = self._params
-        loop = replace(params, loop_delay_s=min(0.1, params.loop_delay_s + params.force_smoothing_s))
-        self._tool = ToolState(params)
-        self._loop = ForceLoop(loop, 1.0 / params.rate_hz)
-        self._follow = FollowWatch()
-        self._state = self._tool.state('')
-        self._command = None
-        self._commanded = REST
-        self._sent_ns = self._gone_ns = self._halted_ns = 0
-        self._zeroed = False
-        self._resting_first = True
-        self._unsafe = ''  # why it may only be lifted, until it is recovered or connected again
-        self._lost = ''  # a fault that stays as long
-        self._failed = ''  # with an internal error
 
     def warning(self) -> str:
         """Return in a sentence that clocks do not agree, '' if they do."""

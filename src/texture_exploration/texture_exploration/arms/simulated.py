@@ -13,15 +13,13 @@ from dataclasses import dataclass, replace
 from texture_core.config import param
 from texture_core.errors import DeviceError
 from texture_core.types import FingerSender, FingerState
-from texture_exploration.arms.arm import STANDSTILL, Arm, ArmCommand, ArmState, Vector
-from texture_exploration.safety import CommandLimits
+from texture_exploration.arms.arm import STANDSTILL, Arm, ArmCommand, ArmState, Vector, check_command
 
 RATE_HZ = 250.0
-RESTING_PERIOD_S = 0.05  # a finger at rest is still reported, at little cost
 
 
 @dataclass(frozen=True)
-class SimulatedArmParams(CommandLimits):
+class SimulatedArmParams:
     """Parameters of the simulated arm and of its contact with the surface."""
 
     stiffness_n_m: float = param(
@@ -64,7 +62,6 @@ class SimulatedArm(Arm):
         self._last_command = (STANDSTILL, clock())  # the command, and when it came
         start: Vector = (0.0, 0.0, params.start_height_m)
         self._state = ArmState(clock(), start, (0.0, 0.0, 0.0), 0.0, along_n=(0.0, 0.0))
-        self._wake = threading.Event()
         self._closing = threading.Event()
         self._thread: threading.Thread | None = None
         self._emulator = FingerSender(params.finger_pipe)
@@ -82,7 +79,6 @@ class SimulatedArm(Arm):
         """Stop and end the thread."""
         self.stop()
         self._closing.set()
-        self._wake.set()
         if self._thread is not None:
             self._thread.join()
             self._thread = None
@@ -102,11 +98,8 @@ class SimulatedArm(Arm):
         """
         if self._closing.is_set():
             raise DeviceError('the simulated arm is not connected; connect it first')
-        self._params.check(command, self.stop)
-        was_idle = self._is_idle
+        check_command(command, self.stop)
         self._last_command = (command, self._clock())
-        if was_idle:
-            self._wake.set()
 
     def stop(self) -> None:
         """Stop."""
@@ -127,10 +120,6 @@ class SimulatedArm(Arm):
         force_n = self._force_n(x, z)
         self._state = replace(self._state, time_ns=now_ns, position=(x, y, z), velocity=(vx, vy, vz), force_n=force_n)
         self._emulator.send(FingerState(now_ns, x, y, z, vx, vy, vz, force_n))
-
-    @property
-    def _is_idle(self) -> bool:
-        return self._last_command[0] == STANDSTILL
 
     def _force_n(self, x_m: float, z_m: float) -> float:
         """Return the force of a finger at (x, z), positive when pressing: a spring up to the edge of the surface."""
@@ -156,14 +145,7 @@ class SimulatedArm(Arm):
 
     def _run(self) -> None:
         last_ns = self._clock()
-        while not self._closing.is_set():
-            if self._is_idle:
-                # A command ends the rest at once, and counts from now on.
-                self._wake.wait(RESTING_PERIOD_S)
-                self._wake.clear()
-                last_ns = self._clock()
-            else:
-                self._closing.wait(1 / RATE_HZ)
+        while not self._closing.wait(1 / RATE_HZ):
             now_ns = self._clock()
             self.step((now_ns - last_ns) * 1e-9)
             last_ns = now_ns

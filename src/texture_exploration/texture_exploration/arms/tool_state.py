@@ -26,14 +26,14 @@ from texture_exploration.arms.arm import (
 )
 from texture_exploration.force_control import ForceLoopParams
 from texture_exploration.guards import WITHOUT_GAPS
-from texture_exploration.safety import MOST_FORCE_N, MOST_M, CommandLimits
+from texture_exploration.safety import MOST_FORCE_N, MOST_M
 
 # --------------------
 # Parameters of an arm that is driven by ROS controllers.
 
 
 @dataclass(frozen=True)
-class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams, CommandLimits):
+class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams):
     """Topics, frames and rates of the controllers, the tool, the surface, and the supervision."""
 
     twist_topic: str = param('twist_controller/twist', 'Topic of the commanded velocities (TwistStamped).')

@@ -16,8 +16,8 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Mapping
-from contextlib import closing
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -36,12 +36,11 @@ from texture_exploration.arms.arm import (
     give_up_when_ending,
     tangential_force_n,
 )
-from texture_exploration.safety import CommandLimits
 
 # --------------------
-# Messages between the arm and its worker process: datagrams on a socket pair, a letter and JSON in each.
+# Messages between the arm and its worker process: datagrams of JSON on a socket pair. To the worker goes a command, or
+# null to stop; from it comes a report, or why it ended as text.
 
-COMMAND, STOP, RECOVER, REPORT, FAILURE = b'c', b's', b'v', b'r', b'f'
 LARGEST = 4096
 
 
@@ -60,11 +59,8 @@ class UrReport(NamedTuple):
     """Newest measurement of the controller, in the base frame, and its status.
 
     `time_ns` is when it arrived, of CLOCK_MONOTONIC. `force_n` is the force of the surroundings on the tool; `zeroed`
-    says that its sensor was zeroed since the arm was connected or recovered. `watchdog_s` is how long the controller's
+    says that its sensor was zeroed since the arm was connected. `watchdog_s` is how long the controller's
     watchdog waits.
-
-    `counts` are totals since the arm was connected. `refused`: commands that the controller did not accept. `zeroed`:
-    zeroings of the force sensor.
     """
 
     time_ns: int
@@ -74,19 +70,7 @@ class UrReport(NamedTuple):
     watchdog_s: float
     safety_mode: int
     playing: bool
-    silent: bool
     zeroed: bool
-    counts: Mapping[str, int]
-
-
-def encoded(kind: bytes, content: UrCommand | UrReport) -> bytes:
-    """Return a message."""
-    return kind + json.dumps(content).encode()
-
-
-def command_of(data: bytes) -> UrCommand:
-    """Return the command in a message."""
-    return UrCommand(*json.loads(data[1:]))
 
 
 # --------------------
@@ -94,7 +78,7 @@ def command_of(data: bytes) -> UrCommand:
 
 
 @dataclass(frozen=True)
-class UrArmParams(ZeroingParams, SurfacePoseParams, CommandLimits):
+class UrArmParams(ZeroingParams, SurfacePoseParams):
     """Address of the controller, pose of the surface, and supervision of the arm."""
 
     ip: str = param('127.0.0.2', 'IP address of the controller; the default, and a path, are of the emulated one.')
@@ -103,9 +87,6 @@ class UrArmParams(ZeroingParams, SurfacePoseParams, CommandLimits):
     )
     watchdog_hz: float = param(
         10.0, 'Rate of commands below which the controller stops the arm.', unit='Hz', low=1.0, high=50.0
-    )
-    silence_s: float = param(
-        0.1, 'How long the controller may send no state before that is a fault.', unit='s', low=0.02, high=2.0
     )
     connect_timeout_s: float = param(
         10.0, 'How long the arm may take to be ready before connecting fails.', unit='s', low=0.5, high=60.0
@@ -163,10 +144,10 @@ class WorkerLink:
         if not self._reader.is_alive() or self.report is None:
             raise DeviceError(self._why_ended())
 
-    def send(self, data: bytes) -> None:
-        """Send a message to the worker, without waiting."""
+    def send(self, command: UrCommand | None) -> None:
+        """Send a command to the worker, or that it is to stop, without waiting."""
         try:
-            self._channel.send(data, socket.MSG_DONTWAIT)
+            self._channel.send(json.dumps(command).encode(), socket.MSG_DONTWAIT)
         except BlockingIOError as error:
             raise DeviceError('the process that talks to the controller hangs; connect again') from error
         except OSError as error:
@@ -184,20 +165,15 @@ class WorkerLink:
         self._channel.close()
 
     def _read(self) -> None:
-        while data := self._receive():
-            kind = data[:1]
-            if kind == REPORT:
-                self.report = UrReport._make(json.loads(data[1:]))
-                self._state_received.set()
-            elif kind == FAILURE:
-                self._failure = data[1:].decode()
+        with contextlib.suppress(OSError):
+            while data := self._channel.recv(LARGEST):
+                content = json.loads(data)
+                if isinstance(content, str):
+                    self._failure = content
+                else:
+                    self.report = UrReport._make(content)
+                    self._state_received.set()
         self._state_received.set()
-
-    def _receive(self) -> bytes:
-        try:
-            return self._channel.recv(LARGEST)
-        except OSError:
-            return b''
 
     def _why_ended(self) -> str:
         self._reader.join(FINAL_MESSAGE_S)  # the last message of the worker may still be on its way
@@ -248,60 +224,52 @@ UNLOCK_WAIT_S = 8.0  # the controller refuses for 5 s
 UNLOCK_RETRY_S = 0.25
 
 
-class DashboardClient:
-    """The dashboard server of a controller: one line per request, one line per answer, all within a time limit."""
+@contextmanager
+def dashboard(ip: str) -> Iterator[Callable[[str], str]]:
+    """Ask the dashboard server of a controller: one line per request, one line per answer, all within `PROBE_S`."""
+    where, end_s = f'{ip}:{DASHBOARD_PORT}', time.monotonic() + PROBE_S
+    try:
+        connection = socket.create_connection((ip, DASHBOARD_PORT), PROBE_S)
+    except OSError as error:
+        if not isinstance(error, ConnectionRefusedError):
+            what = "is the controller on, and is parameter 'ip' its address?"
+            raise DeviceError(f'{where} cannot be reached: {error}; {what}') from error
+        raise DeviceError(
+            f"nothing listens on {where}; is the controller on, and is parameter 'ip' its address? For "
+            "PolyScope X, which has no dashboard, use the arm 'ros_controllers' with ur_robot_driver"
+        ) from error
 
-    def __init__(self, ip: str, timeout_s: float) -> None:
-        self._where = f'{ip}:{DASHBOARD_PORT}'
-        self._timeout_s = timeout_s
-        self._end_s = time.monotonic() + timeout_s
-        try:
-            self._socket = socket.create_connection((ip, DASHBOARD_PORT), timeout_s)
-        except OSError as error:
-            if not isinstance(error, ConnectionRefusedError):
-                what = "is the controller on, and is parameter 'ip' its address?"
-                raise DeviceError(f'{self._where} cannot be reached: {error}; {what}') from error
-            raise DeviceError(
-                f"nothing listens on {self._where}; is the controller on, and is parameter 'ip' its address? For "
-                "PolyScope X, which has no dashboard, use the arm 'ros_controllers' with ur_robot_driver"
-            ) from error
-        self._read_line()  # its greeting
-
-    def close(self) -> None:
-        """Close the connection."""
-        self._socket.close()
-
-    def ask(self, line: str) -> str:
-        """Return the answer to a command."""
-        with contextlib.suppress(OSError):  # reading names what is wrong
-            self._socket.sendall(line.encode() + b'\n')
-        return self._read_line()
-
-    def _read_line(self) -> str:
+    def ask(request: str) -> str:
         line = b''
-        while not line.endswith(b'\n'):
-            self._socket.settimeout(max(0.001, self._end_s - time.monotonic()))
-            with contextlib.suppress(OSError):
-                if byte := self._socket.recv(1):
-                    line += byte
-                    continue
+        with contextlib.suppress(OSError):
+            connection.sendall(request.encode())
+            while not line.endswith(b'\n'):
+                connection.settimeout(max(0.001, end_s - time.monotonic()))
+                if not (byte := connection.recv(1)):
+                    break
+                line += byte
+        if not line.endswith(b'\n'):
             raise DeviceError(
-                f'{self._where} takes connections but does not answer as a UR controller within {self._timeout_s:g} s; '
+                f'{where} takes connections but does not answer as a UR controller within {PROBE_S:g} s; '
                 "wait until it has started, restart it, or correct parameter 'ip'"
             )
         return line.decode('utf-8', 'replace').strip()
 
+    with connection:
+        ask('')  # its greeting
+        yield lambda request: ask(request + '\n')
 
-def check_ready(ip: str, timeout_s: float) -> tuple[int, int]:
+
+def check_ready(ip: str) -> tuple[int, int]:
     """Return the version of a controller whose arm can move."""
-    with closing(DashboardClient(ip, timeout_s)) as dashboard:
-        version = _checked_version(ip, dashboard.ask('PolyscopeVersion'))
-        mode = dashboard.ask('robotmode')
+    with dashboard(ip) as ask:
+        version = _checked_version(ip, ask('PolyscopeVersion'))
+        mode = ask('robotmode')
         if 'RUNNING' not in mode:
             raise DeviceError(f"the arm at {ip} answers '{mode}'; switch it on and release its brakes")
-        if version >= FIRST_WITH_REMOTE_CONTROL and 'true' not in dashboard.ask('is in remote control'):
+        if version >= FIRST_WITH_REMOTE_CONTROL and 'true' not in ask('is in remote control'):
             raise DeviceError(f'the arm at {ip} is under local control; switch the pendant to remote control')
-        safety = _safety(dashboard)
+        safety = _safety(ask)
     if safety not in FREE_MODES:
         raise DeviceError(
             f'the arm at {ip} is held by its safety system ({safety}); find the cause, release it on the '
@@ -327,22 +295,22 @@ def _checked_version(ip: str, answer: str) -> tuple[int, int]:
     return version
 
 
-def unlock_protective_stop(ip: str, timeout_s: float) -> None:
+def unlock_protective_stop(ip: str) -> None:
     """Release a protective stop, as soon as the controller allows it."""
     end_s = time.monotonic() + UNLOCK_WAIT_S
     while True:
-        with closing(DashboardClient(ip, timeout_s)) as dashboard:
-            if _safety(dashboard) in FREE_MODES:
+        with dashboard(ip) as ask:
+            if _safety(ask) in FREE_MODES:
                 return
-            answer = dashboard.ask('unlock protective stop')
+            answer = ask('unlock protective stop')
         if time.monotonic() > end_s:
             raise DeviceError(f"the controller at {ip} does not release the protective stop: '{answer}'")
         time.sleep(UNLOCK_RETRY_S)
 
 
-def _safety(dashboard: DashboardClient) -> str:
+def _safety(ask: Callable[[str], str]) -> str:
     """Return the safety mode, such as NORMAL."""
-    return dashboard.ask('safetymode').rpartition(' ')[2]
+    return ask('safetymode').rpartition(' ')[2]
 
 
 # --------------------
@@ -359,11 +327,11 @@ def check_program(params: UrArmParams, *, pause_is_ours: bool) -> None:
     A stop by the safety system may pause the program of the connection before: `pause_is_ours`, and is stopped. A
     control script of ours whose process was killed is ended by its watchdog.
     """
-    ip, timeout_s = params.ip, PROBE_S
+    ip = params.ip
     end_s = time.monotonic() + max(ACKNOWLEDGE_S, 1.0 / params.watchdog_hz) + WATCHDOG_S
-    while program := _program(ip, timeout_s):
+    while program := _program(ip):
         if pause_is_ours and program.upper().startswith('PAUSED'):
-            _stop(ip, timeout_s)
+            _stop(ip)
             return
         if time.monotonic() > end_s:
             raise DeviceError(
@@ -373,19 +341,19 @@ def check_program(params: UrArmParams, *, pause_is_ours: bool) -> None:
         time.sleep(SAMPLE_PERIOD_S)
 
 
-def _program(ip: str, timeout_s: float) -> str:
+def _program(ip: str) -> str:
     """Return the program that runs or pauses, as the controller reports it; '' if there is none."""
-    with closing(DashboardClient(ip, timeout_s)) as dashboard:
-        running, state = dashboard.ask('running'), dashboard.ask('programState')
+    with dashboard(ip) as ask:
+        running, state = ask('running'), ask('programState')
     return state if 'true' in running.lower() or not state.upper().startswith('STOPPED') else ''
 
 
-def _stop(ip: str, timeout_s: float) -> None:
+def _stop(ip: str) -> None:
     """Stop it."""
-    with closing(DashboardClient(ip, timeout_s)) as dashboard:
-        dashboard.ask('stop')
+    with dashboard(ip) as ask:
+        ask('stop')
     end_s = time.monotonic() + UR_PROGRAM_STOPPING_S
-    while program := _program(ip, timeout_s):
+    while program := _program(ip):
         if time.monotonic() > end_s:
             raise DeviceError(
                 f"the program on the controller at {ip} ('{program}') does not stop; stop it on the pendant"
@@ -394,7 +362,6 @@ def _stop(ip: str, timeout_s: float) -> None:
 
 
 BASE_FRAME_ID = 'base'  # as in ur_robot_driver and the description of UR, without a prefix
-RECOVERY_S = 6.0
 POLL_S = 0.01
 
 
@@ -426,7 +393,7 @@ class UrArm(SurfaceArm):
         DeviceError
             If it cannot be reached, or its arm cannot move.
         """
-        check_ready(self._params.ip, PROBE_S)
+        check_ready(self._params.ip)
 
     def connect(self) -> None:
         """Reach the controller and start its control program.
@@ -445,7 +412,7 @@ class UrArm(SurfaceArm):
         params = self._params
         try:
             self._lock = claim(f'ur {params.ip}', UR_LINK_STOPPING_S + ACKNOWLEDGEMENTS * ACKNOWLEDGE_S)
-            version = check_ready(params.ip, PROBE_S)
+            version = check_ready(params.ip)
             check_program(params, pause_is_ours=self._paused)
             self._link, self._series = WorkerLink(params, self._lock), version[0]
             self._link.wait_for_report()
@@ -498,7 +465,7 @@ class UrArm(SurfaceArm):
         ------
         CommandRefused
             If a number is not finite or out of its range, or a force is wanted before the force sensor was zeroed since
-            the arm was connected or recovered; the arm stops.
+            the arm was connected; the arm stops.
         DeviceError
             If the arm cannot be reached.
         """
@@ -508,31 +475,22 @@ class UrArm(SurfaceArm):
             return
         normal_m_s = command.normal_m_s if command.force_n is None else 0.0
         velocity = self._frame.to_base((*command.tangential_m_s, normal_m_s))
-        self._connected().send(encoded(COMMAND, UrCommand(time.monotonic_ns(), velocity, command.force_n)))
+        self._connected().send(UrCommand(time.monotonic_ns(), velocity, command.force_n))
 
     def stop(self) -> None:
         """Let the worker stop the arm."""
-        self._connected().send(STOP)
+        self._connected().send(None)
 
     def recover(self) -> None:
-        """Release a protective stop and start the control program again, without connecting again.
-
-        The caller makes sure that the arm may move.
+        """Release a protective stop; the arm is to be connected again, by a caller who makes sure that it may move.
 
         Raises
         ------
         DeviceError
             If the controller does not allow it.
         """
-        link = self._connected()
-        if self._report().safety_mode in SAFETY_FAULTS:
-            unlock_protective_stop(self._params.ip, PROBE_S)
-        link.send(RECOVER)
-        end_s = time.monotonic() + RECOVERY_S
-        while fault := self._fault(self._report()):
-            if time.monotonic() > end_s:
-                raise DeviceError(f'the arm did not recover: {fault}; look at the pendant')
-            time.sleep(POLL_S)
+        self.close()
+        unlock_protective_stop(self._params.ip)
 
     @property
     def base_frame_id(self) -> str:
@@ -541,13 +499,8 @@ class UrArm(SurfaceArm):
 
     @property
     def zeroed(self) -> bool:
-        """Whether the force sensor was zeroed since the arm was connected or recovered."""
+        """Whether the force sensor was zeroed since the arm was connected."""
         return self._report().zeroed
-
-    @property
-    def counts(self) -> Mapping[str, int]:
-        """Totals of this connection; see `texture_exploration.arms.ur.UrReport`."""
-        return self._report().counts
 
     def _connected(self) -> WorkerLink:
         if self._link is None:
@@ -561,8 +514,6 @@ class UrArm(SurfaceArm):
         return link.report
 
     def _fault(self, report: UrReport) -> str:
-        if report.silent:
-            return f'the controller is silent for more than {self._params.silence_s * 1e3:.0f} ms'
         if report.safety_mode in SAFETY_FAULTS:
             return SAFETY_FAULTS[report.safety_mode]
         return '' if report.playing else 'its control program was stopped, by hand or by its watchdog'

@@ -15,7 +15,7 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -23,19 +23,12 @@ from texture_core.config import from_mapping
 from texture_exploration.arms.arm import CALM_NS, ZERO_RISE_M, FreeAir, SurfaceFrame, Vector
 from texture_exploration.arms.ur import (
     ACKNOWLEDGE_S,
-    COMMAND,
-    FAILURE,
     LARGEST,
     PROGRAM_PLAYING,
     RATE_HZ,
-    RECOVER,
-    REPORT,
-    STOP,
     UrArmParams,
     UrCommand,
     UrReport,
-    command_of,
-    encoded,
 )
 from texture_exploration.force_control import FORCE_SPEED_M_S
 
@@ -125,8 +118,6 @@ class UrCommandStream:
     """Turn the newest command of the arm into calls of ur-rtde."""
 
     def __init__(self, control: Any, params: UrArmParams, watchdog: Watchdog) -> None:
-        self.refused = 0
-        self.zeroings = 0
         self.trusted = False
         self._control = control
         self._params = params
@@ -149,86 +140,74 @@ class UrCommandStream:
         """Send what is due; None commands standstill, and so does a force before the force sensor is zeroed."""
         if ur_command is not None and ur_command.force_n is not None and not self.trusted:
             ur_command = None
-        mode = _mode(ur_command)
+        mode = Mode.STANDSTILL
+        if ur_command is not None:
+            mode = Mode.SPEED if ur_command.force_n is None else Mode.FORCE
         self._braking &= mode is Mode.STANDSTILL
         if mode is not self._mode and not self._change(mode, ur_command):
             return
         if mode is Mode.FORCE:
             self._air.presume_contact()
-        self._count(STREAM[mode](self, ur_command))
+        if ur_command is None:
+            self._hold_still()
+        elif mode is Mode.FORCE:
+            self._force(ur_command)
+        else:
+            self._speed(ur_command)
 
     def stand_still(self) -> None:
-        """Stop at once, and return when the arm is at rest."""
+        """Stop at once, and return when the arm is at rest; commands that are acknowledged are not overwritten."""
         with self._watchdog.patient():
-            self._stop()
-
-    def reset(self) -> None:
-        """The program on the controller was started again: the arm is at rest, in contact or not."""
-        self._mode = Mode.STANDSTILL
-        self._braking = False
-        self.trusted = False
-        self._air.presume_contact()
+            self._watchdog.call(self._control.speedStop, STOP_DECELERATION_M_S2)
+            if self._mode is Mode.FORCE:
+                self._watchdog.call(self._control.forceModeStop)
+            self._mode = Mode.STANDSTILL
 
     def _change(self, mode: Mode, ur_command: UrCommand | None) -> bool:
         """Leave the present mode; return whether the new one has begun."""
         # A command that streams takes effect at once; those that follow wait for each other.
         if self._mode is Mode.FORCE and ur_command is not None and self._turns_back(ur_command.velocity_m_s):
             # The finger has met something, and would be driven into it until the end of force control is acknowledged.
-            self._count(self._speed(ur_command._replace(velocity_m_s=self._along(ur_command.velocity_m_s))))
+            self._speed(ur_command._replace(velocity_m_s=self._along(ur_command.velocity_m_s)))
             return False
         if mode is Mode.STANDSTILL and not self._braking:
             self._braking = True
-            self._count(bool(self._control.speedL([0.0] * 6, STOP_DECELERATION_M_S2, 1.0 / RATE_HZ)))
+            self._control.speedL([0.0] * 6, STOP_DECELERATION_M_S2, 1.0 / RATE_HZ)
             return False
-        self._leave(mode)
+        if mode is Mode.STANDSTILL:
+            self.stand_still()
+        elif self._mode is Mode.FORCE:
+            with self._watchdog.patient():
+                self._watchdog.call(self._control.forceModeStop)
         # The watchdog guards every mode but standstill; at rest one that waits too long is set again.
         late = self._mode is Mode.STANDSTILL and self._watchdog.moving_s > 1.0 / self._params.watchdog_hz
         if mode is not Mode.STANDSTILL and (late or not self._watchdog.armed) and not self._watchdog.arm():
-            self._count(False)
             return False
         self._mode = mode
         self._rest_ns = self._measured_ns
         self._braking = self._next_is_speed = False
         return True
 
-    def _leave(self, mode: Mode) -> None:
-        """Do what ends the present mode."""
-        if mode is Mode.STANDSTILL:
-            self.stand_still()
-        elif self._mode is Mode.FORCE:
-            with self._watchdog.patient():
-                self._count(self._watchdog.call(self._control.forceModeStop))
-
-    def _stop(self) -> None:
-        """Come to rest; these commands are acknowledged, so nothing overwrites them."""
-        self._count(self._watchdog.call(self._control.speedStop, STOP_DECELERATION_M_S2))
-        if self._mode is Mode.FORCE:
-            self._count(self._watchdog.call(self._control.forceModeStop))
-        self._mode = Mode.STANDSTILL
-
-    def _hold_still(self, _ur_command: UrCommand | None) -> bool:
+    def _hold_still(self) -> None:
         """Zero the force sensor as soon as the arm has calmed down in free air."""
         if self._air.proven and self._measured_ns - self._rest_ns > CALM_NS:
             with self._watchdog.patient():
                 taken = self._watchdog.call(self._control.zeroFtSensor)
-            self._count(taken)
             if taken:
                 self.trusted = True
-                self.zeroings += 1
                 self._air.presume_contact()  # the force is another one now; the next zeroing needs a new proof
             else:
                 self._rest_ns = self._measured_ns  # free air is still proven: try again after another rest
-        return bool(self._control.kickWatchdog())
+        self._control.kickWatchdog()
 
-    def _speed(self, ur_command: UrCommand) -> bool:
+    def _speed(self, ur_command: UrCommand) -> None:
         velocity = [*ur_command.velocity_m_s, 0.0, 0.0, 0.0]
         if self._turns_back(ur_command.velocity_m_s):
             self._turned_ns = self._measured_ns
         self._led_m_s = ur_command.velocity_m_s
         # A finger that turns back has met something: as hard as a stop.
         turns = self._measured_ns - self._turned_ns < TURN_NS
-        acceleration = max(STOP_DECELERATION_M_S2 if turns else 0.0, ACCELERATION_M_S2)
-        return bool(self._control.speedL(velocity, acceleration, 1.0 / RATE_HZ))
+        self._control.speedL(velocity, STOP_DECELERATION_M_S2 if turns else ACCELERATION_M_S2, 1.0 / RATE_HZ)
 
     def _turns_back(self, velocity_m_s: Vector) -> bool:
         return sum(now * before for now, before in zip(velocity_m_s, self._led_m_s, strict=True)) < 0.0
@@ -238,32 +217,17 @@ class UrCommandStream:
         x, y, _ = self._frame.direction(velocity_m_s)
         return self._frame.to_base((x, y, 0.0))
 
-    def _force(self, ur_command: UrCommand) -> bool:
+    def _force(self, ur_command: UrCommand) -> None:
         """Command force and sliding alternately."""
         self._next_is_speed = not self._next_is_speed
         if not self._next_is_speed:
-            return self._speed(ur_command)
+            self._speed(ur_command)
+            return
         normal_only = [0, 0, 1, 0, 0, 0]
         wrench = [0.0, 0.0, -(ur_command.force_n or 0.0), 0.0, 0.0, 0.0]
         limits = [*(FORCE_DEVIATION_M,) * 2, FORCE_SPEED_M_S, *(FORCE_DEVIATION_RAD,) * 3]
         frame = list(self._params.surface_pose)
-        return bool(self._control.forceMode(frame, normal_only, wrench, FORCE_FRAME_FIXED, limits))
-
-    def _count(self, taken: bool) -> None:
-        self.refused += not taken
-
-
-STREAM: Mapping[Mode, Callable[[UrCommandStream, Any], bool]] = {
-    Mode.STANDSTILL: UrCommandStream._hold_still,
-    Mode.SPEED: UrCommandStream._speed,
-    Mode.FORCE: UrCommandStream._force,
-}
-
-
-def _mode(ur_command: UrCommand | None) -> Mode:
-    if ur_command is None:
-        return Mode.STANDSTILL
-    return Mode.SPEED if ur_command.force_n is None else Mode.FORCE
+        self._control.forceMode(frame, normal_only, wrench, FORCE_FRAME_FIXED, limits)
 
 
 # --------------------
@@ -275,19 +239,20 @@ def _mode(ur_command: UrCommand | None) -> Mode:
 
 VARIABLES = ['timestamp', 'actual_TCP_pose', 'actual_TCP_speed', 'actual_TCP_force', 'safety_mode', 'runtime_state']
 HANGING_S = 2.0  # no command takes longer
-RESTART_S = 5.0  # of the program on the controller
+SILENT_S = 0.1  # without a state of the controller, after which it gets no more commands
 LATE_S = 0.02
 OTHER_PROGRAM = (
     'the program on the controller was stopped, and another user started one; check who uses the arm, and connect again'
 )
+MOST_CHARACTERS = 500  # of a reason
 LOST = 'the connection to the controller was lost; is it still on, and the cable in place?'
 
 
 class Observer:
     """Reports the measurements of the controller, in a separate thread: commands may take a while.
 
-    `newest` is the last report, None before the first; `idle` is set by each in which no program plays; `zeroed`,
-    `watchdog_s` and `counts` come from the other thread.
+    `newest` is the last report, None before the first; `idle` is set by each in which no program plays; `zeroed`
+    and `watchdog_s` come from the other thread.
 
     Silence counts only while this thread is awake, so that a stalled machine is not reported as a dead controller.
     """
@@ -296,14 +261,11 @@ class Observer:
         self.connected = True
         self.silent = self.zeroed = self.idle = False
         self.watchdog_s = 1.0 / params.watchdog_hz
-        self.counts: Mapping[str, int] = {}
         self.newest: UrReport | None = None
         self._receive = receive
         self._channel = channel
-        self._silence_s = params.silence_s
         self._period_s = 1.0 / RATE_HZ
         self._stamp = -1.0
-        self._time_ns = time.monotonic_ns()
         self._silent_for_s = 0.0
 
     def run(self) -> None:
@@ -320,34 +282,28 @@ class Observer:
 
     def _poll(self, passed_s: float) -> None:
         stamp = self._receive.getTimestamp()
-        if stamp != self._stamp:
-            self._stamp, self._time_ns = stamp, time.monotonic_ns()
-            self._silent_for_s, self.silent = 0.0, False
-            self._report()
-            return
         self._silent_for_s += passed_s
-        if self._silent_for_s > self._silence_s and not self.silent:
-            self.silent = True
+        if stamp != self._stamp:
+            self._stamp, self._silent_for_s = stamp, 0.0
             self._report()
+        self.silent = self._silent_for_s > SILENT_S
 
     def _report(self) -> None:
         receive = self._receive
         report = UrReport(
-            time_ns=self._time_ns,
+            time_ns=time.monotonic_ns(),
             position_m=_vector(receive.getActualTCPPose()),
             velocity_m_s=_vector(receive.getActualTCPSpeed()),
             force_n=_vector(receive.getActualTCPForce()),
             watchdog_s=self.watchdog_s,
             safety_mode=receive.getSafetyMode(),
             playing=receive.getRuntimeState() == PROGRAM_PLAYING,
-            silent=self.silent,
             zeroed=self.zeroed,
-            counts=self.counts,
         )
         self.newest = report
         self.idle |= not report.playing
         try:
-            self._channel.send(encoded(REPORT, report), socket.MSG_DONTWAIT)
+            self._channel.send(json.dumps(report).encode(), socket.MSG_DONTWAIT)
         except BlockingIOError:
             pass  # a parent that does not read has no use for old states
         except OSError:
@@ -379,7 +335,8 @@ class Worker:
     def run(self) -> str:
         """Run until the parent or the controller is gone; return the reason in a sentence."""
         try:
-            self._set_watchdog()
+            if not self._watchdog.arm():
+                raise RuntimeError('the controller did not accept the watchdog, without which the arm does not move')
             threading.Thread(target=self._observer.run, name='observer', daemon=True).start()
             while self._receive_commands():
                 if not (self._observer.connected and self._control.isConnected()):
@@ -397,29 +354,21 @@ class Worker:
     def _cycle(self) -> None:
         begin = self._control.initPeriod()
         set_alarm(HANGING_S)
-        self._take_measurement()
-        # A controller that does not answer would execute a command late, when it is outdated.
-        if self._stopped:
-            self._clear()
-        elif not self._observer.silent:
-            self._commands.cycle(self._ur_command)
-        self._update_observer()
-        self._control.waitPeriod(begin)
-
-    def _take_measurement(self) -> None:
-        """Pass on the newest measurement."""
-        newest = self._observer.newest
+        # Take the newest measurement.
+        newest, commands = self._observer.newest, self._commands
         if newest is not None and newest.time_ns != self._measured_ns:
             self._measured_ns = newest.time_ns
-            self._commands.observe(newest.time_ns, newest.position_m, newest.force_n)
-
-    def _update_observer(self) -> None:
-        """Pass on to the observer what it reports in addition to the measurements."""
-        commands = self._commands
+            commands.observe(newest.time_ns, newest.position_m, newest.force_n)
+        # A program that starts would find the last command in its register and obey it: take it back. A controller that
+        # does not answer would execute a command late, when it is outdated.
+        if self._stopped:
+            self._control.kickWatchdog()
+        elif not self._observer.silent:
+            commands.cycle(self._ur_command)
         # After the cycle and not at once: a force that is reported as zeroed is from after the zeroing.
         self._observer.zeroed = commands.trusted
         self._observer.watchdog_s = self._watchdog.moving_s
-        self._observer.counts = {'refused': commands.refused, 'zeroed': commands.zeroings}
+        self._control.waitPeriod(begin)
 
     def _watch_program(self) -> None:
         """Detect another program: one that plays again after a stop was started by others.
@@ -428,7 +377,8 @@ class Worker:
         """
         # A command that waits for its acknowledgement may outlast the stop: the observer has seen it.
         idle, self._observer.idle = self._observer.idle, False
-        playing = self._plays()
+        newest = self._observer.newest
+        playing = newest is not None and newest.playing
         self._other_program |= (self._stopped or (idle and self._was_playing)) and playing
         self._was_playing |= playing
         self._stopped = self._was_playing and not playing
@@ -447,10 +397,13 @@ class Worker:
         """Take the newest command of the parent; return whether the parent is still there."""
         try:
             while data := self._channel.recv(LARGEST, socket.MSG_DONTWAIT):
-                self._handle(data)
+                content = json.loads(data)
+                self._ur_command = UrCommand._make(content) if content else None
         except BlockingIOError:
-            if self._ur_command is not None and self._age_s(self._ur_command) > self._holds_s(self._ur_command):
-                self._ur_command = None
+            if self._ur_command is not None:
+                age_s = (time.monotonic_ns() - self._ur_command.time_ns) * 1e-9
+                if age_s > self._holds_s(self._ur_command):
+                    self._ur_command = None
             return True
         except OSError:
             pass
@@ -461,44 +414,6 @@ class Worker:
         params = self._params
         falls = ur_command.force_n is None and self._frame.direction(ur_command.velocity_m_s)[2] < 0.0
         return min(params.command_timeout_s, 1.0 / params.watchdog_hz) if falls else params.command_timeout_s
-
-    @staticmethod
-    def _age_s(ur_command: UrCommand) -> float:
-        return (time.monotonic_ns() - ur_command.time_ns) * 1e-9
-
-    def _handle(self, data: bytes) -> None:
-        kind = data[:1]
-        if kind == COMMAND:
-            self._ur_command = command_of(data)
-        elif kind == STOP:
-            self._ur_command = None
-        elif kind == RECOVER:
-            self._recover()
-
-    def _clear(self) -> None:
-        """Take the last command back: a program that starts would find it in its register and obey it."""
-        self._control.kickWatchdog()
-
-    def _recover(self) -> None:
-        """Start the program on the controller again."""
-        set_alarm(RESTART_S + HANGING_S)
-        self._ur_command = None
-        self._clear()
-        self._control.reuploadScript()
-        end_s = time.monotonic() + RESTART_S
-        while not (self._control.isProgramRunning() and self._plays()) and time.monotonic() < end_s:
-            time.sleep(0.005)
-        self._set_watchdog()
-        self._commands.reset()
-        self._stopped = self._observer.idle = False
-
-    def _plays(self) -> bool:
-        newest = self._observer.newest
-        return newest is not None and newest.playing
-
-    def _set_watchdog(self) -> None:
-        if not self._watchdog.arm():
-            raise RuntimeError('the controller did not accept the watchdog, without which the arm does not move')
 
 
 def _vector(values: Sequence[float]) -> Vector:
@@ -529,7 +444,7 @@ def main() -> None:
         traceback.print_exc()
         reason = f'the process that talks to the controller failed ({error!r}) and stopped the arm; connect again'
     if reason:
-        channel.send(FAILURE + reason.encode()[: LARGEST - 1])
+        channel.send(json.dumps(reason[:MOST_CHARACTERS]).encode())
     # Closing the interfaces of ur-rtde takes seconds; the end of the process also closes their connections.
     os._exit(0)
 

@@ -58,7 +58,6 @@ from texture_exploration.arms.catalogue import ARMS
 from texture_exploration.exploration import (
     STILL_MOVING,
     Exploration,
-    ExplorationEstimates,
     ExplorationOutcome,
     may_stop,
     new_id,
@@ -102,6 +101,14 @@ class ExplorerParams:
     )
 
 
+Estimates = dict[str, TextureEstimate | RoughnessEstimate]  # the newest, by kind
+
+
+def no_estimates(exploration_id: str) -> Estimates:
+    """Return the estimates of an exploration before the first one came."""
+    return {'texture': TextureEstimate(0, exploration_id), 'roughness': RoughnessEstimate(0, exploration_id)}
+
+
 class ExplorerNode(PatientLifecycleNode):
     """Explore on request, as a service or as an action; publish the state of the finger.
 
@@ -117,7 +124,7 @@ class ExplorerNode(PatientLifecycleNode):
         self._transforms = self.create_publisher(TFMessage, '/tf_static', STATIC_QOS)
         self._broadcast_surface()
         self._rng, self._numbers = np.random.default_rng(), itertools.count(1)
-        self._open: dict[str, ExplorationEstimates] = {}  # explorations whose caller still waits, by id
+        self._open: dict[str, Estimates] = {}  # of explorations whose caller still waits, by id
         self._last_end, self._not_lifted = 'none', ''  # in sentences
         self._publishing = threading.Lock()
         self._closing = False
@@ -135,8 +142,6 @@ class ExplorerNode(PatientLifecycleNode):
         self._offer('~/stop', self._stop, group)
         self._offer('~/recover', self._recover, group)
         self._offer('~/lift', self._lift, group)
-        if self._explorer.arm.reboots:
-            self._offer('~/reboot', self._explorer.reboot, group)
         if self._explorer.arm.base_frame_id:
             self._offer('~/touch_surface', self._touch_surface, group)
             self._offer('~/forget_touches', self._forget_touches, group)
@@ -283,24 +288,23 @@ class ExplorerNode(PatientLifecycleNode):
             result.error_code, result.message = int(refusal(error)), str(error)
             result.field = 'motion' if isinstance(error, UnknownName) else error.field
             # Their numbers are NaN, not the zeros that a new message holds.
-            nothing = ExplorationEstimates('')
-            result.texture, result.roughness = to_msg(nothing.texture), to_msg(nothing.roughness)
+            result.texture, result.roughness = map(to_msg, no_estimates('').values())
             self.get_logger().warning(f'refused: {error}')
             return result
-        estimates = self._open[exploration.exploration_id] = ExplorationEstimates(exploration.exploration_id)
+        estimates = self._open[exploration.exploration_id] = no_estimates(exploration.exploration_id)
         try:
             wait(exploration)
             if exploration.outcome.slid:
                 kinds = [kind for kind in ('texture', 'roughness') if self.count_publishers(kind)]
                 end_s = time.monotonic() + self._estimate_timeout_s
-                while not (self._closing or estimates.final(kinds) or time.monotonic() > end_s):
+                while not (self._closing or time.monotonic() > end_s or all(estimates[kind].final for kind in kinds)):
                     time.sleep(ESTIMATE_PERIOD_S)
         finally:
             del self._open[exploration.exploration_id]
         outcome = exploration.outcome
         result.error_code, result.message, result.lifted = int(outcome.error), outcome.message, outcome.lifted
         result.exploration_id = exploration.exploration_id
-        result.texture, result.roughness = to_msg(estimates.texture), to_msg(estimates.roughness)
+        result.texture, result.roughness = map(to_msg, estimates.values())
         of_model = (result.texture.model, result.texture.revision) == (self._model.model, self._model.revision)
         result.labels = self._model.labels if of_model and result.texture.probabilities else []
         self._last_end = outcome.sentence(exploration.exploration_id)
@@ -335,7 +339,7 @@ class ExplorerNode(PatientLifecycleNode):
                 exploration.stop('cancelled by the client', ExplorationError.CANCELLED)
             estimates = self._open[exploration.exploration_id]
             state = self._stamped(exploration.state)
-            goal.publish_feedback(action.Explore.Feedback(state=to_msg(state), texture=to_msg(estimates.texture)))
+            goal.publish_feedback(action.Explore.Feedback(state=to_msg(state), texture=to_msg(estimates['texture'])))
 
     def _offer(self, name: str, work: Callable[[], str], group: ReentrantCallbackGroup) -> None:
         """Offer a service without arguments; `work` returns a message, or raises an error."""
@@ -382,7 +386,7 @@ class ExplorerNode(PatientLifecycleNode):
         estimates = self._open.get(estimate.exploration_id)
         if estimates is None:
             return
-        estimates.update(estimate)
+        estimates['texture' if isinstance(estimate, TextureEstimate) else 'roughness'] = estimate
         current = self._explorer.current
         if current is None or current.exploration_id != estimate.exploration_id or not current.request.early_stopping:
             return
@@ -458,9 +462,7 @@ class ExplorerNode(PatientLifecycleNode):
             'exploration': current.exploration_id if current else '',
             'last_end': self._last_end,
             'arm_fault': fault or 'none',
-            'arm_state_age_s': self._explorer.arm_age_s(),
             **self._explorer.counts,
-            **{f'arm_{name}': count for name, count in self._explorer.arm_counts().items()},
         }
         if not self._active:
             return 'WARN', 'the explorer is not active: it has no control of the arm', numbers

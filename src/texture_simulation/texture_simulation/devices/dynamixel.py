@@ -271,11 +271,9 @@ class EmulatedDynamixelBus(EmulatedSerialRobot):
         motors: DynamixelMotors,
         finger: FingerMotors | None = None,
         finger_pipe: str = '',
-        latency_s: float = 0.0,
     ) -> None:
         super().__init__(link, finger_pipe)
         self.motors = motors
-        self.latency_s = latency_s
         self._finger = finger
         self._received = b''
 
@@ -285,10 +283,7 @@ class EmulatedDynamixelBus(EmulatedSerialRobot):
         while not self.closing.is_set():
             with self.port_lock:
                 data = self.port.read()
-                answers = self.receive(data)
-                if answers:
-                    self.closing.wait(self.latency_s)
-                self.port.write(answers)
+                self.port.write(self.receive(data))
             if not data:
                 self.closing.wait(IDLE_S)
             steps = int((time.monotonic() - due_s) / PHYSICS_S)
