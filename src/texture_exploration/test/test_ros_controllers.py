@@ -693,8 +693,10 @@ LIES = {
 }
 
 
-@pytest.mark.parametrize('stiffness_n_m', [2000.0, 20000.0])
-@pytest.mark.parametrize('lie', LIES)
+# A wall also where it is soft; the whole range is swept by the benchmark of motions.
+@pytest.mark.parametrize(
+    ('lie', 'stiffness_n_m'), [*((lie, 20000.0) for lie in LIES), *((lie, 2000.0) for lie in LIES if 'wall' in lie)]
+)
 def test_no_hidden_force_follows_from_what_is_not_as_the_arm_is_told(lie, stiffness_n_m, record_property):
     emulated, given, most_n, message = LIES[lie]
     params = {key: value for key, value in given.items() if key.startswith('surface')}
