@@ -83,7 +83,8 @@ def test_a_deactivated_explorer_lifts_lets_go_and_refuses_until_it_is_activated_
     graph.until(lambda: any(state.phase == msg.ExplorationState.PHASE_SLIDE for state in states))
     explorer.trigger_deactivate()
     assert exploration.ended.is_set()
-    assert (exploration.outcome.success, exploration.outcome.message) == (False, 'the explorer released the arm')
+    assert (exploration.outcome.success, exploration.outcome.lifted) == (False, True)
+    assert exploration.outcome.message == 'the explorer released the arm'
     with pytest.raises(DeviceError, match='not connected'):
         explorer._explorer.arm.command(ArmCommand())
     recover = graph.peer.create_client(Trigger, 'explorer/recover')
