@@ -4,9 +4,6 @@
 
 from __future__ import annotations
 
-import os
-import re
-import tty
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
@@ -21,7 +18,7 @@ from sensor_rig import CASES, Feed, Rig, biotac, counting
 from texture_core.types import lost_samples
 from texture_drivers.biotac import BioTac
 from texture_drivers.sensor import SensorParams
-from texture_simulation.devices.fingers import ByteFaults, EmulatedBioTac, EmulatedTsf85
+from texture_simulation.devices.fingers import EmulatedBioTac
 
 pytestmark = pytest.mark.realtime
 
@@ -67,12 +64,10 @@ def test_words_damaged_on_the_board_are_nan_and_no_neighbour_moves(open_rig: Mak
     assert rig.sensor.counts['damaged_words'] > 0
 
 
-def test_the_serial_number_is_reported_and_a_silent_bridge_is_an_error_with_advice(open_rig: Make) -> None:
+def test_the_serial_number_is_reported(open_rig: Make) -> None:
     rig = board(open_rig)
     rig.signal_s(1.5)
     assert rig.sensor.details['serial of finger 0'] == 'BT-0'
-    rig.set(silent=True)
-    assert 'sends no complete frames' in rig.fault()
 
 
 def test_all_fingers_of_a_board_have_separate_topics(open_rig: Make) -> None:
@@ -102,24 +97,6 @@ def test_the_channels_keep_their_order(open_rig: Make) -> None:
     np.testing.assert_array_equal(last.samples[:, 7], -last.samples[:, 0])
 
 
-@pytest.mark.parametrize(
-    ('name', 'silence', 'other', 'babble'),
-    [
-        ('daq', 'sends nothing', {'faults': ByteFaults(flip=0.2)}, 'no valid frame.*baud'),
-        ('tsf85', 'sends nothing, started', {'wrong_firmware': True}, 'no known packet'),
-    ],
-)
-def test_a_silent_device_and_one_that_sends_other_bytes_have_different_reports(
-    open_rig: Make, name: str, silence: str, other: dict[str, Any], babble: str
-) -> None:
-    rig = open_rig(name)
-    rig.set(silent=True)
-    assert silence in rig.fault()
-    rig.set(silent=False, **other)
-    rig.sensor.open()
-    assert re.search(babble, rig.fault())
-
-
 def swing(device: Any, first: int, ticks: int) -> None:
     """Feed a film that swings at 50 Hz, and a force that rises."""
     numbers = np.arange(first, first + ticks)[:, None, None]
@@ -139,55 +116,6 @@ def test_film_and_force_come_as_two_streams_in_their_units(open_rig: Make) -> No
     charge = np.concatenate([batch.samples for batch in film])
     assert charge.max() == pytest.approx(2.0, rel=0.01)  # 1000 counts of 0.002 pC
     assert np.diff(np.concatenate([batch.samples for batch in force]), axis=0) == pytest.approx(0.005, abs=1e-6)
-
-
-TEN_MS = {'signal': np.arange(10)[:, None, None], 'signal_static': np.empty((0, 28, 1))}
-START, STOP = bytes.fromhex('9A 00 58 01 01'), bytes.fromhex('9A 00 58 01 00')
-
-
-@pytest.fixture
-def device(tmp_path: Path) -> Iterator[EmulatedTsf85]:
-    made = EmulatedTsf85(tmp_path / 'new' / 'tsf85', np.random.default_rng(0))
-    made.plug()
-    yield made
-    made.unplug()
-
-
-class Host:
-    def __init__(self, link: Path) -> None:
-        self.end = os.open(link, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-        tty.setraw(self.end)
-
-    def read(self) -> bytes:
-        try:
-            return os.read(self.end, 100_000)
-        except BlockingIOError:
-            return b''
-
-
-@pytest.fixture
-def host(tmp_path: Path, device: EmulatedTsf85) -> Iterator[Host]:
-    made = Host(tmp_path / 'new' / 'tsf85')
-    yield made
-    os.close(made.end)
-
-
-def test_it_streams_from_start_to_stop_only(device: EmulatedTsf85, host: Host) -> None:
-    device.measure(TEN_MS)
-    assert host.read() == b''
-    os.write(host.end, START)
-    device.measure(TEN_MS)
-    assert host.read().count(b'\x9a\x00\x58') == 10
-    os.write(host.end, STOP)
-    device.measure(TEN_MS)
-    assert host.read() == b''
-
-
-def test_it_never_waits_for_a_host_that_does_not_read(device: EmulatedTsf85, host: Host) -> None:
-    os.write(host.end, START)
-    for _ in range(200):
-        device.measure(TEN_MS)
-    assert device.dropped_bytes > 50_000
 
 
 def test_the_public_client_of_the_vendor_reads_each_packet_of_the_tsf85(tmp_path: Path) -> None:
