@@ -17,6 +17,7 @@ import pytest
 # Files without such a test are not imported by `-m realtime` and `-m benchmark`: each worker saves seconds.
 NAMED_MARKERS = ('realtime', 'benchmark')
 SYSTEM = 'texture_bringup'  # the package whose realtime tests start all nodes
+os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'  # nodes of tests are found by this machine alone
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:

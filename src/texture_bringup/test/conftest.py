@@ -1,23 +1,30 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What several tests of the whole suite share: simulated slides and a model of them, made once for all of a run."""
+"""What several tests of the whole suite share: simulated slides and a model of them, and a launched robot."""
 
 from __future__ import annotations
 
 import fcntl
+import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 from texture_bringup.command import main
+from texture_bringup.launcher import ChildLauncher
 from texture_evaluation.train import train_from_bags
 from texture_simulation.offline import SlidePlan, write_simulated
 
 TWO = ('glass', 'ridge_2mm_deep')
+# A busy machine may hold up an emulated robot for longer than a real one is allowed to be silent.
+PATIENT = {'state_timeout_s': 2.0, 'signal_timeout_s': 3.0, 'estimate_timeout_s': 10.0}
+START_S = 90.0
 
 
 @pytest.fixture(scope='session')
@@ -35,6 +42,46 @@ def two_surfaces(tmp_path_factory: pytest.TempPathFactory, request: pytest.Fixtu
             train_from_bags('default', bags, out=folder / 'model')
             (folder / 'finished').touch()
     return folder
+
+
+class Launched(ChildLauncher):
+    """A launched robot."""
+
+    ending: ExitStack
+
+    def operator(self, namespace: str = '', *, senses: bool = True) -> Any:
+        """Return a client of the nodes of a namespace, once they explore and estimate and, if it senses, measure."""
+        from texture_bringup.operator import Operator  # noqa: PLC0415  # pure tests have no ROS
+
+        operator = self.ending.enter_context(Operator(namespace, guard=self.check))
+        operator.wait_for_explorer(START_S)
+        if senses:
+            operator.wait_for_signal(START_S)
+        operator.wait_for_listeners(('exploration', 'features'), 1, self.check)
+        return operator
+
+
+@contextmanager
+def running(
+    file: str, domain_id: int, folder: Path, params: dict[str, Any] | None = None, **arguments: Any
+) -> Iterator[Launched]:
+    """Launch a robot with a patient explorer; the commands of the test find its nodes in this ROS domain."""
+    patient = folder / 'patient.yaml'
+    patient.write_text(yaml.safe_dump({'/**': {'ros__parameters': {**PATIENT, **(params or {})}}}))
+    two = {'left_params': patient, 'right_params': patient}
+    given = (two if file == 'two_arms' else {'devices': folder, 'explorer_params': patient}) | arguments
+    with pytest.MonkeyPatch.context() as patch, ExitStack() as ending:
+        for name, value in {'ROS_DOMAIN_ID': str(domain_id), 'ROS_LOG_DIR': str(folder)}.items():
+            patch.setenv(name, value)
+        launcher = ending.enter_context(Launched(file, given, dict(os.environ), folder / 'nodes.log'))
+        launcher.ending = ending
+        yield launcher
+
+
+@pytest.fixture(scope='session')
+def launched() -> Callable[..., AbstractContextManager[Launched]]:
+    """Return the function that launches a robot for a `with` block."""
+    return running
 
 
 @pytest.fixture

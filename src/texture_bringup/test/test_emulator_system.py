@@ -17,18 +17,15 @@ from xml.etree import ElementTree
 import aiohttp
 import pytest
 
-pytestmark = [pytest.mark.realtime, pytest.mark.ros]
-os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-
 from texture_bringup.launcher import ChildLauncher
-from texture_bringup.operator import Operator
 from texture_core import config as resources
 from texture_core.errors import InvalidParameter, LaunchFailed
 from texture_core.types import ExplorationRequest, Rejection
 from texture_evaluation.train import train_from_bags, train_grades_from_bags
 
+pytestmark = [pytest.mark.realtime, pytest.mark.ros]
+
 DOMAIN = 61
-PATIENT = '/**: {ros__parameters: {estimate_timeout_s: 10.0, signal_timeout_s: 3.0}}'  # this machine may be busy
 DEADLINE_S = 60.0
 NODES = {'emulator', 'sensor', 'explorer', 'feature_extractor', 'classifier', 'dashboard'}
 NODES |= {'roughness_features', 'roughness_estimator'}
@@ -71,23 +68,18 @@ def port():
 
 
 @pytest.fixture(scope='module')
-def emulator(folder, roughness_model, port):
-    patient = folder / 'patient.yaml'
-    patient.write_text(PATIENT)
-    environment = {**os.environ, 'ROS_DOMAIN_ID': str(DOMAIN), 'ROS_LOG_DIR': str(folder)}
-    given = {'devices': folder, 'namespace': 'left', 'surface': 'ridge_2mm_deep', 'roughness_model': roughness_model}
-    given |= {'explorer_params': patient, 'dashboard': 'true', 'dashboard_port': port}
-    with ChildLauncher('emulator', given, environment, folder / 'nodes.log') as launcher:
+def emulator(launched, folder, roughness_model, port):
+    given = {'namespace': 'left', 'surface': 'ridge_2mm_deep', 'roughness_model': roughness_model}
+    given |= {'dashboard': 'true', 'dashboard_port': port}
+    with launched('emulator', DOMAIN, folder, **given) as launcher:
         yield launcher
 
 
 @pytest.fixture(scope='module')
 def operator(emulator):
-    with Operator('left', DOMAIN, emulator.check) as operator:
-        operator.wait_for_explorer(DEADLINE_S)
-        operator.wait_for_signal(DEADLINE_S)
-        operator.wait_for_listeners(('features', 'roughness_features'), 1, emulator.check)  # who names and who grades
-        yield operator
+    operator = emulator.operator('left')
+    operator.wait_for_listeners(('roughness_features',), 1, emulator.check)  # who grades
+    return operator
 
 
 @pytest.fixture(scope='module')

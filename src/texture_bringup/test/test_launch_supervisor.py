@@ -22,9 +22,9 @@ DEADLINE_S = 20.0
 class Launched:
     """A running launcher."""
 
-    def __init__(self, file: Path, prefix: Path, options: tuple[str, ...] = ()) -> None:
+    def __init__(self, file: Path, prefix: Path, options: tuple[str, ...], program: tuple[str, ...]) -> None:
         environment = {**os.environ, 'AMENT_PREFIX_PATH': str(prefix), 'TMPDIR': str(prefix)}
-        command = [sys.executable, '-m', 'texture_bringup.command', 'launch', *options, str(file)]
+        command = [*program, sys.executable, '-m', 'texture_bringup.command', 'launch', *options, str(file)]
         self.process = subprocess.Popen(
             command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
         )
@@ -59,7 +59,7 @@ def launch(tmp_path):
         (tmp_path / 'share/ament_index/resource_index/packages' / package).touch()
     started = []
 
-    def start(scripts: dict[str, str], *options: str, **attributes: str) -> Launched:
+    def start(scripts: dict[str, str], *options: str, program: tuple[str, ...] = (), **attributes: str) -> Launched:
         nodes = ''
         for name, script in scripts.items():
             (tmp_path / 'lib/p' / name).write_text(f'#!/bin/sh\n{script}\n')
@@ -67,7 +67,7 @@ def launch(tmp_path):
             package = 'texture_simulation' if name == 'emulated' else 'p'
             nodes += f'<node pkg="{package}" exec="{name}" output="screen" {attributes.get(name, "")}/>'
         (tmp_path / 'a.launch.xml').write_text(f'<launch>{nodes}</launch>')
-        started.append(Launched(tmp_path / 'a.launch.xml', tmp_path, options))
+        started.append(Launched(tmp_path / 'a.launch.xml', tmp_path, options, program))
         return started[-1]
 
     yield start
@@ -187,8 +187,13 @@ def test_together_the_death_of_any_node_stops_all_and_none_is_restarted(launch) 
     assert all(gone(pid) for pid in pids)
 
 
-def test_nodes_end_with_a_launcher_that_is_killed(launch) -> None:
-    launched = launch({'good': GOOD})
+# As the demonstration does; PARENT is its process.
+PROGRAM = ('sh', '-c', 'set -- $(echo "$@" | sed "s/PARENT/$$/"); "$@" & wait', 'sh')
+
+
+@pytest.mark.parametrize(('program', 'options'), [((), ()), (PROGRAM, ('--parent', 'PARENT'))])
+def test_nodes_end_with_a_launcher_or_with_its_program_that_is_killed(launch, program, options) -> None:
+    launched = launch({'good': GOOD}, *options, program=program)
     pid = launched.ready()
     launched.process.kill()
     assert gone(pid)

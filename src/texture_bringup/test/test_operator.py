@@ -1,6 +1,5 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-import os
 import threading
 import time
 from contextlib import ExitStack, contextmanager
@@ -24,7 +23,6 @@ DOMAIN = 62
 @contextmanager
 def silent_explorer(taken=None, goals=None, begin=None):
     """An explorer that takes a goal once `begin` is set, sets `taken`, and never answers; `goals` are those taken."""
-    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     context, over, left = Context(), threading.Event(), threading.Event()
     taken = taken or threading.Event()
     context.init(domain_id=DOMAIN)

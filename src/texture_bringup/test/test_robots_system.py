@@ -3,24 +3,18 @@
 """Each emulated robot as a user starts and uses it: the launch file, then `texture explore`."""
 
 import math
-import os
 import re
 
 import numpy as np
 import pytest
-import yaml
-
-pytestmark = [pytest.mark.realtime, pytest.mark.ros]
-os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 from texture_bringup import command
-from texture_bringup.launcher import ChildLauncher
-from texture_bringup.operator import Operator
 from texture_core import config as resources
 from texture_evaluation.train import train_from_bags
 from texture_simulation.offline import SlidePlan, write_simulated
 
-DEADLINE_S = 60.0
+pytestmark = [pytest.mark.realtime, pytest.mark.ros]
+
 SURFACE = 'ridge_2mm_deep'
 LINEAR = ['linear_slide', '--speed', '0.05', '--distance', '0.05', '--direction']
 CIRCULAR = ['circular', '--speed', '0.05', '--radius', '0.02', '--turns', '0.5', '--direction', '45']
@@ -77,29 +71,13 @@ def model(tmp_path_factory):
 
 
 @pytest.mark.parametrize('robot', ROBOTS)
-def test_motions_on_an_emulated_robot_end_with_an_estimate(robot, model, tmp_path, monkeypatch, capsys):
-    for name, value in {'ROS_DOMAIN_ID': str(ROBOTS[robot]), 'ROS_LOG_DIR': str(tmp_path)}.items():
-        monkeypatch.setenv(name, value)
-    # A busy machine may hold up the emulated robot for longer than a real one is allowed to be silent.
-    patient = {
-        'state_timeout_s': 1.5,
-        'peak_speed_fraction': 5.0,
-        'mean_speed_fraction': 1.0,
-        'estimate_timeout_s': 10.0,
-        'signal_timeout_s': 3.0,
-        **PATIENCE.get(robot, {}),
-    }
-    (tmp_path / 'patient.yaml').write_text(yaml.safe_dump({'/**': {'ros__parameters': patient}}))
-    given = {'devices': tmp_path, 'surface': SURFACE}
+def test_motions_on_an_emulated_robot_end_with_an_estimate(robot, launched, model, tmp_path, capsys):
+    params = {'peak_speed_fraction': 5.0, 'mean_speed_fraction': 1.0, **PATIENCE.get(robot, {})}
+    given = {'surface': SURFACE, 'model': model, 'recipe': model.with_name('power.yaml')}
     if robot == 'hand':
         given['profile'] = patient_hand(tmp_path)
-    given |= {'model': model, 'recipe': model.with_name('power.yaml')}
-    given['explorer_params'] = tmp_path / 'patient.yaml'
-    with ChildLauncher(robot, given, dict(os.environ), tmp_path / 'nodes.log') as launcher:
-        with Operator(guard=launcher.check) as operator:
-            operator.wait_for_explorer(DEADLINE_S)
-            operator.wait_for_signal(DEADLINE_S)
-            operator.wait_for_listeners(('exploration', 'features'), 1, launcher.check)  # who estimates
+    with launched(robot, ROBOTS[robot], tmp_path, params, **given) as launcher:
+        launcher.operator()
         assert 'this has no effect' not in launcher.log.read_text()  # whatever a launch file gives is a parameter
         # Two directions in one call are the same on every robot; the rails approach fastest.
         directions = ['0', '180'] if robot == 'rails' else ['180']

@@ -17,10 +17,10 @@ from typing import Any, TypeVar
 from unittest import mock
 
 import rclpy
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 
 from texture_core.config import executable
+from texture_core.ros import WaitingExecutor
 
 # --------------------
 # Nodes of the suite as processes: start, measure the computing time, stop.
@@ -128,7 +128,7 @@ class LocalGraph:
             stack.enter_context(mock.patch.dict(os.environ, self._environment))
             rclpy.init()
             stack.callback(rclpy.try_shutdown)
-            self._executor = SingleThreadedExecutor()
+            self._executor = WaitingExecutor()
             self._closing = stack.pop_all()
         self.peer = self._spun(rclpy.create_node('peer'))
         return self

@@ -24,7 +24,6 @@ from twist_robot import Robot
 # The pure tests run where there is no ROS.
 ROS_TESTS = [
     'test_explorer_node.py',
-    'test_interrupted_controller.py',
     'test_ros_controllers_hand_over.py',
     'test_ros_controllers_process.py',
     'test_services_page.py',

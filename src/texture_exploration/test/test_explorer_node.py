@@ -4,8 +4,6 @@
 
 import math
 import signal
-import subprocess
-import sys
 import time
 from contextlib import closing
 from dataclasses import replace
@@ -14,20 +12,18 @@ from types import SimpleNamespace
 from unittest.mock import Mock
 
 import pytest
-import rclpy
-from action_msgs.msg import GoalStatus
 from builtin_interfaces.msg import Duration
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.action import ActionClient
-from rclpy.node import Node
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
-from texture_msgs import action, msg, srv
+from texture_msgs import msg, srv
 from tf2_msgs.msg import TFMessage
 
 from texture_core.errors import DeviceError, ExplorationError, InvalidParameter
-from texture_core.ros import ESTIMATE_QOS, SENSOR_QOS, STATE_QOS, WaitingExecutor, check_names, to_msg, to_ns
-from texture_core.ros_testing import LocalGraph, killed_on_error
+from texture_core.ros import ESTIMATE_QOS, SENSOR_QOS, STATE_QOS, check_names, to_msg, to_ns
+from texture_core.ros_testing import LocalGraph, NodeProcess
 from texture_core.types import FingerReceiver, Phase, Rejection, TextureEstimate, quaternion_matrix
 from texture_exploration.arms.arm import SurfaceFrame
 from texture_exploration.arms.simulated import SimulatedArm
@@ -51,100 +47,57 @@ def request_of(timeout_s=0, **fields):
     return msg.ExplorationRequest(timeout=Duration(sec=timeout_s), **fields)
 
 
-class Client(Node):
-    """A client that calls, subscribes and, on request, estimates."""
+class World:
+    """An explorer and who asks it."""
 
-    def __init__(self):
-        super().__init__('client')
-        self.states, self.diagnostics, self.feedback = [], [], []
-        self.answer = None  # makes a texture estimate of a state
-        self.create_subscription(msg.ExplorationState, 'exploration', self._on_state, STATE_QOS)
-        self.create_subscription(DiagnosticArray, '/diagnostics', self.diagnostics.append, 10)
-        self.explore = self.create_client(srv.Explore, 'explore')
-        self.stop = self.create_client(Trigger, 'explorer/stop')
-        self.action = ActionClient(self, action.Explore, 'explore')
+    def __init__(self, graph, **parameters):
+        values = {'start_height_m': 0.002, 'state_timeout_s': 1.0, 'watch_signal': False, **parameters}
+        self.explorer, self.peer, self.until = graph.add(ExplorerNode, **values), graph.peer, graph.until
+        self.states = graph.listen(msg.ExplorationState, 'exploration', STATE_QOS)
+        self.diagnostics = graph.listen(DiagnosticArray, '/diagnostics')
+        self.explore = self.peer.create_client(srv.Explore, 'explore')
+        self.until(self.explore.service_is_ready)
 
     def estimate(self, answer):
-        publisher = self.create_publisher(msg.TextureEstimate, 'texture', ESTIMATE_QOS)
-        self.answer = lambda state: publisher.publish(to_msg(answer(state)))
+        """Answer each state of an exploration with an estimate."""
+        publisher = self.peer.create_publisher(msg.TextureEstimate, 'texture', ESTIMATE_QOS)
+        self.until(publisher.get_subscription_count)
+
+        def on_state(state):
+            if state.exploration_id:
+                publisher.publish(to_msg(answer(state)))
+
+        self.peer.create_subscription(msg.ExplorationState, 'exploration', on_state, STATE_QOS)
         return publisher
 
-    def _on_state(self, state):
-        self.states.append(state)
-        if self.answer is not None and state.exploration_id:
-            self.answer(state)
-
-
-class World:
-    """An explorer and a client in one executor."""
-
-    def __init__(self, **parameters):
-        values = {'start_height_m': 0.002, 'state_timeout_s': 1.0, 'watch_signal': False, **parameters}
-        overrides = [Parameter(name, value=value) for name, value in values.items()]
-        self.explorer = ExplorerNode(parameter_overrides=overrides)
-        self.client = Client()
-        self.executor = WaitingExecutor()
-        self.executor.add_node(self.explorer)
-        self.executor.add_node(self.client)
-        assert self.client.explore.wait_for_service(DEADLINE_S)
-        assert self.client.stop.wait_for_service(DEADLINE_S)
-
-    def until(self, condition):
-        deadline = time.monotonic() + DEADLINE_S
-        while not condition():
-            assert time.monotonic() < deadline, 'the deadline passed'
-            self.executor.spin_once(timeout_sec=0.05)
+    def call(self, **request):
+        return self.explore.call_async(srv.Explore.Request(request=request_of(**request)))
 
     def result(self, future):
         self.until(future.done)
         return future.result()
 
-    def explored(self, future):
-        return self.result(future).result
+    def explored(self, **request):
+        return self.result(self.call(**request)).result
 
     def phases(self, exploration_id):
         def seen():
-            return [phase_of(state) for state in self.client.states if state.exploration_id == exploration_id]
+            return [phase_of(state) for state in self.states if state.exploration_id == exploration_id]
 
         # The result may be here before the last state is.
         self.until(lambda: seen()[-1:] in (['done'], ['aborted']))
         return [phase for before, phase in zip([None, *seen()], seen(), strict=False) if phase != before]
 
-    def call(self, **request):
-        return self.client.explore.call_async(srv.Explore.Request(request=request_of(**request)))
 
-    def goal(self, **request):
-        assert self.client.action.wait_for_server(DEADLINE_S)
-        goal = action.Explore.Goal(request=request_of(**request))
-        return self.result(self.client.action.send_goal_async(goal, self.client.feedback.append))
-
-    def until_phase(self, phase):
-        self.until(lambda: any(phase_of(state) == phase for state in self.client.states))
-
-    def close(self):
-        self.explorer.shutdown()
-        self.executor.shutdown()
-        self.explorer.destroy_node()
-        self.client.destroy_node()
+@pytest.fixture
+def graph():
+    with LocalGraph(68, deadline_s=DEADLINE_S) as graph:
+        yield graph
 
 
 @pytest.fixture
-def ros():
-    with LocalGraph(68):
-        yield
-
-
-@pytest.fixture
-def make_world(ros):
-    worlds = []
-
-    def make(**parameters):
-        worlds.append(World(**parameters))
-        return worlds[-1]
-
-    yield make
-    for world in worlds:
-        world.close()
+def make_world(graph):
+    return partial(World, graph)
 
 
 @pytest.fixture
@@ -154,23 +107,23 @@ def world(make_world):
 
 def test_a_service_call_explores_and_reports(make_world):
     world = make_world(surface_frame_id='table')
-    before = world.client.get_clock().now().nanoseconds
-    response = world.explored(world.call(**QUICK, surface='cork'))
+    before = world.peer.get_clock().now().nanoseconds
+    response = world.explored(**QUICK, surface='cork')
     assert (response.error_code, response.message, response.lifted) == (OK, 'the motion was completed', True)
     assert not response.texture.label
     assert world.phases(response.exploration_id) == ['approach', 'contact', 'slide', 'lift', 'done']
-    states = [state for state in world.client.states if state.exploration_id]
+    states = [state for state in world.states if state.exploration_id]
     assert {(state.surface, state.header.frame_id) for state in states} == {('cork', 'table')}
     stamps = [to_ns(state.header.stamp) for state in states]
     assert stamps == sorted(stamps)
-    assert before < stamps[0] <= stamps[-1] < world.client.get_clock().now().nanoseconds
+    assert before < stamps[0] <= stamps[-1] < world.peer.get_clock().now().nanoseconds
     sliding = [state for state in states if state.phase == msg.ExplorationState.PHASE_SLIDE]
     begin, end = sliding[0], sliding[-1]
     passed_s = (to_ns(end.header.stamp) - to_ns(begin.header.stamp)) * 1e-9
     assert end.position.x - begin.position.x == pytest.approx(QUICK['speed_m_s'] * passed_s, abs=0.003)
     assert abs(end.position.y - begin.position.y) < 1e-3
     assert abs(end.position.z) < 2e-3  # pressed on the plane z = 0
-    world.until(lambda: phase_of(world.client.states[-1]) == 'idle')
+    world.until(lambda: phase_of(world.states[-1]) == 'idle')
 
 
 def test_the_surface_is_broadcast_where_the_arm_believes_it_in_its_base_frame(make_world, monkeypatch):
@@ -178,7 +131,7 @@ def test_the_surface_is_broadcast_where_the_arm_believes_it_in_its_base_frame(ma
     monkeypatch.setattr(SimulatedArm, 'base_frame_id', 'base')
     monkeypatch.setattr(SimulatedArm, 'surface_pose', pose)
     world, heard = make_world(surface_frame_id='table'), []
-    world.client.create_subscription(TFMessage, '/tf_static', heard.append, STATIC_QOS)
+    world.peer.create_subscription(TFMessage, '/tf_static', heard.append, STATIC_QOS)
     world.until(lambda: heard)
     [transform] = heard[0].transforms
     assert (transform.header.frame_id, transform.child_frame_id) == ('base', 'table')
@@ -187,19 +140,10 @@ def test_the_surface_is_broadcast_where_the_arm_believes_it_in_its_base_frame(ma
     assert in_base == pytest.approx(SurfaceFrame(pose).place_to_base(here))
 
 
-def test_an_unknown_motion_is_refused_with_the_nearest_name(world):
-    response = world.explored(world.call(motion='linear_slid'))
-    assert response.error_code == Result.ERROR_UNKNOWN_MOTION
-    assert "did you mean 'linear_slide'" in response.message
-    assert response.exploration_id == ''
-    # Numbers that nobody knows are NaN, not the zeros of a new message.
-    unknown = response.texture.confidence, response.roughness.grade, response.roughness.grade_std
-    assert all(map(math.isnan, unknown))
-
-
 @pytest.mark.parametrize(
     ('request_fields', 'sentence'),
     [
+        ({'motion': 'linear_slid'}, "did you mean 'linear_slide'"),
         ({'surface': 'x' * 100_000}, 'has 100000 characters; at most 100'),
         ({'surface': '../../etc/x'}, 'slash'),
         ({'direction_rad': 1e300}, 'the direction is 5.72958e+301°; allowed is'),
@@ -208,10 +152,14 @@ def test_an_unknown_motion_is_refused_with_the_nearest_name(world):
     ],
 )
 def test_a_request_that_cannot_be_meant_is_refused_before_anything_moves(world, request_fields, sentence):
-    response = world.explored(world.call(**QUICK, **request_fields))
-    assert (response.error_code, response.lifted) == (Result.ERROR_INVALID_REQUEST, False)
+    response = world.explored(**{**QUICK, **request_fields})
+    code = Result.ERROR_UNKNOWN_MOTION if 'motion' in request_fields else Result.ERROR_INVALID_REQUEST
+    assert (response.error_code, response.lifted) == (code, False)
     assert sentence in response.message
     assert not response.exploration_id
+    # Numbers that nobody knows are NaN, not the zeros of a new message.
+    unknown = response.texture.confidence, response.roughness.grade, response.roughness.grade_std
+    assert all(map(math.isnan, unknown))
 
 
 @pytest.mark.parametrize(
@@ -226,16 +174,9 @@ def test_an_arm_that_is_lost_or_a_planner_that_fails_at_a_request_does_not_end_t
 ):
     with monkeypatch.context() as patch:
         patch.setattr(world.explorer._explorer, '_prepare', Mock(side_effect=error))
-        response = world.explored(world.call(**QUICK))
+        response = world.explored(**QUICK)
     assert (response.error_code, response.message) == (code, str(error))
-    assert world.explored(world.call(**QUICK)).error_code == OK
-
-
-def test_an_estimate_that_is_inconsistent_does_not_end_the_node(world):
-    publisher = world.client.create_publisher(msg.TextureEstimate, 'texture', ESTIMATE_QOS)
-    world.until(publisher.get_subscription_count)
-    publisher.publish(msg.TextureEstimate(rejection=200))
-    assert world.explored(world.call(**QUICK)).error_code == OK
+    assert world.explored(**QUICK).error_code == OK
 
 
 def test_a_parameter_that_only_counts_at_the_start_is_read_only(world):
@@ -246,25 +187,27 @@ def test_a_parameter_that_only_counts_at_the_start_is_read_only(world):
     assert outcome.successful, outcome.reason
 
 
-def test_a_parameter_of_another_arm_is_no_misspelled_one(make_world):
+def test_a_parameter_of_another_arm_is_no_misspelled_one_and_no_topic_may_have_any_name(make_world):
     check_names(make_world(connect_timeout_s=2.0).explorer)
     with pytest.raises(InvalidParameter, match="no parameter 'x_hihg_m'; did you mean 'x_high_m'"):
         check_names(make_world(x_hihg_m=0.1).explorer)
+    with pytest.raises(InvalidParameter, match=r"'signal_topics' is .*, which names no topics"):
+        make_world(watch_signal=True, signal_topics="signal' x")
 
 
 def test_a_sensor_that_falls_silent_in_the_slide_ends_it_and_the_next_exploration_works(make_world):
     world = make_world(watch_signal=True)
-    signals = world.client.create_publisher(msg.TactileSignal, 'signal', SENSOR_QOS)
-    sensor = world.client.create_timer(0.01, lambda: signals.publish(msg.TactileSignal()))
+    signals = world.peer.create_publisher(msg.TactileSignal, 'signal', SENSOR_QOS)
+    sensor = world.peer.create_timer(0.01, lambda: signals.publish(msg.TactileSignal()))
     world.until(signals.get_subscription_count)
     call = world.call(**SLOW)
-    world.until_phase('slide')
+    world.until(lambda: any(phase_of(state) == 'slide' for state in world.states))
     sensor.cancel()
-    response = world.explored(call)
+    response = world.result(call).result
     assert (response.error_code, response.lifted) == (Result.ERROR_NO_SIGNAL, True)
     assert response.message.startswith("no samples on 'signal' for")
     sensor.reset()
-    assert world.explored(world.call(**QUICK)).error_code == OK
+    assert world.explored(**QUICK).error_code == OK
 
 
 def test_an_abort_is_logged_as_a_warning_and_a_finger_that_was_not_lifted_as_an_error():
@@ -286,18 +229,17 @@ def test_an_abort_is_logged_as_a_warning_and_a_finger_that_was_not_lifted_as_an_
     ]
 
 
-def test_stop_works_while_the_service_is_busy(world):
-    call = world.call(**SLOW)
-    world.until_phase('slide')
-    assert world.result(world.client.stop.call_async(Trigger.Request())).success
-    response = world.explored(call)
-    assert (response.error_code, response.message) == (Result.ERROR_STOPPED, 'stopped on request')
-    assert response.lifted
-    assert world.phases(response.exploration_id)[-2:] == ['lift', 'aborted']
+def test_an_invalid_lifecycle_request_is_refused_and_the_explorer_lives(world):
+    client = world.peer.create_client(ChangeState, 'explorer/change_state')
+    world.until(client.service_is_ready)
+    for number in (Transition.TRANSITION_CONFIGURE, 99) * 2:
+        answer = world.result(client.call_async(ChangeState.Request(transition=Transition(id=number))))
+        assert not answer.success
+    assert world.explored(**QUICK).error_code == OK
 
 
 def test_an_arm_in_a_protective_stop_is_recovered_by_a_service(world):
-    recover = world.client.create_client(Trigger, 'explorer/recover')
+    recover = world.peer.create_client(Trigger, 'explorer/recover')
     assert recover.wait_for_service(DEADLINE_S)
     arm = world.explorer._explorer.arm
     connect, state = arm.connect, arm.state
@@ -305,17 +247,7 @@ def test_an_arm_in_a_protective_stop_is_recovered_by_a_service(world):
     arm.connect = lambda: (setattr(arm, 'state', state), connect())
     response = world.result(recover.call_async(Trigger.Request()))
     assert (response.success, response.message) == (True, 'the arm can move')
-    assert world.explored(world.call(**QUICK)).error_code == OK
-
-
-def test_the_action_reports_how_it_goes(world):
-    goal = world.goal(**{**QUICK, 'distance_m': 0.06})
-    result = world.result(goal.get_result_async())
-    assert result.status == GoalStatus.STATUS_SUCCEEDED
-    assert result.result.result.error_code == OK
-    states = [note.feedback.state for note in world.client.feedback]
-    assert {state.exploration_id for state in states} == {result.result.result.exploration_id}
-    assert 'slide' in map(phase_of, states)
+    assert world.explored(**QUICK).error_code == OK
 
 
 def cork(state, **values):
@@ -324,13 +256,12 @@ def cork(state, **values):
 
 
 def test_a_decided_texture_ends_the_slide_early(world):
-    publisher = world.client.estimate(lambda state: cork(state, final=phase_of(state) in ('lift', 'done')))
-    world.until(publisher.get_subscription_count)
-    response = world.explored(world.call(**SLOW, early_stopping=True))
+    world.estimate(lambda state: cork(state, final=phase_of(state) in ('lift', 'done')))
+    response = world.explored(**SLOW, early_stopping=True)
     assert response.error_code == OK
     assert response.message == "ended early: 'cork' is decided with 0.99 after 5 windows"
     assert (response.texture.label, response.texture.final) == ('cork', True)
-    assert max(state.progress for state in world.client.states if phase_of(state) == 'slide') < 0.5
+    assert max(state.progress for state in world.states if phase_of(state) == 'slide') < 0.5
 
 
 @pytest.mark.parametrize(
@@ -342,53 +273,46 @@ def test_a_decided_texture_ends_the_slide_early(world):
 )
 def test_the_newest_estimate_of_this_exploration_is_given(make_world, estimate, found):
     world = make_world(estimate_timeout_s=0.2)
-    publisher = world.client.estimate(estimate)
-    world.until(publisher.get_subscription_count)
-    texture = world.explored(world.call(**QUICK)).texture
+    publisher = world.estimate(estimate)
+    publisher.publish(msg.TextureEstimate(rejection=200))  # inconsistent: it does not end the node
+    texture = world.explored(**QUICK).texture
     assert (texture.label, texture.windows, texture.final) == found
 
 
 def test_a_changed_limit_holds_for_the_next_request(world):
     slower = Parameter('max_speed_m_s', value=0.05)
     assert world.explorer.set_parameters([slower])[0].successful
-    assert 'allowed is 0.002 to 0.05 m/s' in world.explored(world.call(**QUICK)).message
+    assert 'allowed is 0.002 to 0.05 m/s' in world.explored(**QUICK).message
     wrong = world.explorer.set_parameters([Parameter('force_limit_n', value=1.0)])[0]
     assert "it must be above 'max_force_n'" in wrong.reason
 
 
 def test_the_diagnostics_count_what_happened(world):
-    response = world.explored(world.call(**QUICK))
+    response = world.explored(**QUICK)
     assert response.error_code == OK, response.message
-    world.explored(world.call(motion='nothing'))
+    world.explored(motion='nothing')
 
     def numbers():
-        return {pair.key: pair.value for array in world.client.diagnostics for pair in array.status[0].values}
+        return {pair.key: pair.value for array in world.diagnostics for pair in array.status[0].values}
 
     world.until(lambda: (numbers().get('done'), numbers().get('refused')) == ('1', '1'))
     assert numbers()['phase'] == 'idle'
 
 
-def test_a_name_that_no_topic_can_have_is_refused_in_one_sentence(make_world):
-    with pytest.raises(InvalidParameter, match=r"'signal_topics' is .*, which names no topics"):
-        make_world(watch_signal=True, signal_topics="signal' x")
-
-
-def test_ctrl_c_while_sliding_lifts_the_finger_answers_and_ends_the_process(ros, tmp_path):
-    with closing(FingerReceiver(str(tmp_path / 'finger'))) as emulator:
-        program = 'from texture_exploration.nodes.explorer import main; main()'
-        options = ['--ros-args', '-p', f'finger_pipe:={tmp_path / "finger"}', '-p', 'watch_signal:=false']
-        with subprocess.Popen([sys.executable, '-c', program, *options]) as explorer, killed_on_error(explorer):
-            client = Client()
-            assert client.explore.wait_for_service(DEADLINE_S)
-            answer = client.explore.call_async(srv.Explore.Request(request=request_of(**SLOW)))
-            deadline = time.monotonic() + DEADLINE_S
-            while not any(finger.vx_m_s > 0.009 for finger in emulator.states(0.1)):
-                assert time.monotonic() < deadline, 'the finger does not slide'
-            explorer.send_signal(signal.SIGINT)
-            last = last_until_exit(emulator, explorer)
-            rclpy.spin_until_future_complete(client, answer, timeout_sec=DEADLINE_S)
-            client.destroy_node()
-    assert explorer.returncode == 0
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGHUP])
+def test_a_signal_that_ends_the_process_in_the_slide_lifts_the_finger_and_answers_first(graph, tmp_path, number):
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # under nohup it is ignored, and a node would inherit that
+    pipe = str(tmp_path / 'finger')
+    given = {'finger_pipe': pipe, 'watch_signal': False}
+    with closing(FingerReceiver(pipe)) as emulator, NodeProcess('texture_exploration', 'explorer', given) as explorer:
+        client = graph.peer.create_client(srv.Explore, 'explore')
+        graph.until(client.service_is_ready)
+        answer = client.call_async(srv.Explore.Request(request=request_of(**SLOW)))
+        graph.until(lambda: any(finger.vx_m_s > 0.009 for finger in emulator.states(0.0)))
+        explorer.process.send_signal(number)
+        last = last_until_exit(emulator, explorer.process)
+        graph.until(answer.done)
+        assert explorer.process.returncode == 0
     assert last.force_n == 0
     assert last.z_m == pytest.approx(0.01, abs=0.001)
     assert answer.result().result.message == 'the explorer was shut down'

@@ -4,18 +4,13 @@
 
 import functools
 import re
-import signal
-import subprocess
-import sys
 import time
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 
 import pytest
 
-from texture_core.ros_testing import killed_on_error
 from texture_core.types import ExplorationRequest, Phase
-from texture_exploration.arms.catalogue import ARMS
 from texture_exploration.arms.in_hand import InHandArm, InHandParams
 from texture_exploration.arms.rails import RailsArm, RailsParams
 from texture_exploration.arms.ur import UrArm, UrArmParams
@@ -53,11 +48,6 @@ def ur(controller):
 
 
 @contextmanager
-def patient_ur(controller):
-    yield controller, UrArm(UrArmParams(ip=UR.ip, watchdog_hz=3.0)), FIRM
-
-
-@contextmanager
 def rails(folder):
     with EmulatedRails(folder / 'rails', RailsMachine(start_height_m=HEIGHT_M)) as device:
         yield device, RailsArm(RailsParams(device=str(device.port.link), height_m=HEIGHT_M)), SLIDE
@@ -71,10 +61,6 @@ def hand(folder):
 
 def nothing(_device):
     pass
-
-
-def lose(motor):
-    return lambda bus: setattr(bus.motors, 'absent', motor)
 
 
 def hold(motors):
@@ -96,10 +82,6 @@ FAULTS = {
     ),
     'ur is stopped by hand': (ur, 'rtde_control', lambda c: c.ask('stop'), nothing, 'its control program', 0.1),
     'rails lose their cable': (rails, 'serial', EmulatedRails.unplug, EmulatedRails.plug, 'cannot be reached', 0.1),
-    'rails fall silent': (
-        rails, 'serial', lambda r: setattr(r, 'silent', True),
-        lambda r: setattr(r, 'silent', False), 'not answered', SILENCE_S + 0.02,
-    ),
     'rails meet something': (
         rails,
         'serial',
@@ -107,15 +89,6 @@ FAULTS = {
         lambda r: setattr(r.firmware, 'machine', RailsMachine(start_height_m=HEIGHT_M)),
         'does not follow its motor',
         0.1,
-    ),
-    'a hand loses a sliding motor': (hand, 'dynamixel_sdk', lose({0}), lose(set()), 'motor 0 .* does not answer', 0.15),
-    'a hand loses a holding motor': (hand, 'dynamixel_sdk', lose({13}), lose(set()), 'motor 13 .* not answer', 0.15),
-    'a hand loses its cable': (
-        hand, 'dynamixel_sdk', EmulatedDynamixelBus.unplug, EmulatedDynamixelBus.plug, 'cannot be reached', 0.1,
-    ),
-    'ur stalls': (
-        patient_ur, 'rtde_control', lambda c: c.ask('emulate speed 0.15'), lambda c: c.ask('emulate speed 1'),
-        STALLED, 0.5,
     ),
     'rails stall': (
         rails, 'serial',
@@ -127,11 +100,6 @@ FAULTS = {
     ),
     'hand stalls': (hand, 'dynamixel_sdk', hold(set(range(16)) - {1, 5, 9, 13}), hold(set()), STALLED, 0.5),
 }  # fmt: skip
-
-
-def test_every_arm_has_a_test_of_a_finger_that_stalls():
-    tested = {name.split()[0] for name, (*_, expected, _soon_s) in FAULTS.items() if expected is STALLED}
-    assert tested | {'ros_controllers', 'simulated'} == set(ARMS)  # those in virtual time
 
 
 def explored(explorer, request, on_slide=None):
@@ -152,7 +120,7 @@ def test_a_fault_in_the_slide_is_reported_in_time_and_the_next_exploration_works
     robot, module, happens, repair, expected, soon_s = FAULTS[name]
     pytest.importorskip(module)
     with ExitStack() as open_now:
-        place = request.getfixturevalue('controller') if robot in (ur, patient_ur) else tmp_path
+        place = request.getfixturevalue('controller') if robot is ur else tmp_path
         device, arm, slide = open_now.enter_context(robot(place))
         patience_s = SILENCE_S if 'not answered' in expected else 1.0
         limits = SafetyLimits(state_timeout_s=patience_s, x_high_m=0.5)  # each UR begins where the last one ended
@@ -178,70 +146,3 @@ def test_a_fault_in_the_slide_is_reported_in_time_and_the_next_exploration_works
         explorer.limits = replace(limits, state_timeout_s=1.0)
         again, _ = explored(explorer, replace(slide, distance_m=0.02))
         assert again.outcome.success, again.outcome.message
-
-
-KILLED = """
-import sys
-from texture_core.types import ExplorationRequest
-from texture_exploration.arms.catalogue import ARMS
-from texture_exploration.explorer import Explorer
-from texture_exploration.touch import TouchParams
-from texture_exploration.safety import SafetyLimits
-
-name, parameters, request = sys.argv[1], eval(sys.argv[2]), eval(sys.argv[3])
-touch = TouchParams(speed_tolerance=0.3, force_tolerance=0.2, peak_speed_fraction=3.4)
-limits = SafetyLimits(state_timeout_s=1.0)
-explorer = Explorer(ARMS[name](ARMS[name].Params(**parameters)), touch, limits, lambda state: None)
-explorer.connect()
-explorer.begin('one', ExplorationRequest(**request)).ended.wait()
-"""
-LONG = {'motion': 'linear_slide', 'speed_m_s': 0.05, 'distance_m': 0.15}
-LONG_RUB = {'motion': 'in_hand_sliding', 'speed_m_s': 0.02, 'duration_s': 20.0}
-
-
-# Robot, module it needs, its parameters, a long slide, where the finger is, how far it goes before the explorer is
-# killed, and how long it may still move: the rails' watchdog waits for 0.15 s, a motor goes to its last goal.
-KILLINGS = {
-    'rails': (
-        rails, 'serial', lambda device: {'device': str(device.port.link), 'height_m': HEIGHT_M}, LONG,
-        lambda device: device.firmware.position[0], 0.01, 0.2,
-    ),
-    'hand': (
-        hand, 'dynamixel_sdk',
-        lambda bus: {'device': str(bus.port.link), 'grip_timeout_s': 20.0}, LONG_RUB,
-        lambda bus: bus.motors.angle_rad(0), 0.03, 0.15,
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize('name', KILLINGS)
-def test_when_the_explorer_is_killed_in_the_slide_the_robot_stops_by_itself(name, tmp_path, record_property):
-    robot, module, parameters, request, place, way, soon_s = KILLINGS[name]
-    pytest.importorskip(module)
-
-    def until(condition):
-        deadline = time.monotonic() + DEADLINE_S
-        while not condition():
-            assert time.monotonic() < deadline
-            time.sleep(0.002)
-
-    with robot(tmp_path) as (device, arm, next_request):
-        begin = place(device)
-        command = [sys.executable, '-c', KILLED, name, repr(parameters(device)), repr(request)]
-        with subprocess.Popen(command) as explorer, killed_on_error(explorer):
-            until(lambda: abs(place(device) - begin) > way)
-            explorer.send_signal(signal.SIGKILL)
-            begin_s = moved_s = time.monotonic()
-        last = place(device)
-        while time.monotonic() < moved_s + 0.3:
-            if place(device) != pytest.approx(last, abs=1e-6):
-                last, moved_s = place(device), time.monotonic()
-            assert moved_s < begin_s + DEADLINE_S
-            time.sleep(0.002)
-        record_property('stopped_s', moved_s - begin_s)
-        print(f'{name} stopped {1e3 * (moved_s - begin_s):.0f} ms after the death of the explorer')
-        assert moved_s - begin_s < soon_s + BUSY_S
-        again = Explorer(arm, TOUCH, SafetyLimits(state_timeout_s=1.0), lambda state: None)
-        again.connect()
-        assert explored(again, next_request)[0].outcome.success
-        again.close()

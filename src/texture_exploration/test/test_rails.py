@@ -93,22 +93,12 @@ def test_bytes_lost_on_the_line_are_counted_and_survived(rails, arm):
     until(lambda: arm.state().time_ns > before)
 
 
-def test_unplugged_rails_are_reported_and_can_be_connected_again(rails, arm):
-    rails.unplug()
-    with pytest.raises(DeviceError, match='cannot be reached'):
-        until(lambda: not arm.state())
-    with pytest.raises(DeviceError, match='cannot be reached'):
-        arm.command(SLIDING)
-    with pytest.raises(DeviceError, match='check that they are plugged in'):
-        arm.connect()
-    rails.plug()
-    arm.connect()
-    assert arm.state().fault == ''
-
-
-def test_a_silent_device_is_reported(rails):
+def test_a_silent_and_an_unplugged_device_are_reported(rails):
     rails.silent = True
     with pytest.raises(DeviceError, match='sends no state of rails'):
+        RailsArm(RailsParams(device=str(rails.port.link))).connect()
+    rails.unplug()
+    with pytest.raises(DeviceError, match='check that they are plugged in'):
         RailsArm(RailsParams(device=str(rails.port.link))).connect()
 
 

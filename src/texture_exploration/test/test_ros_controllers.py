@@ -354,9 +354,10 @@ def test_a_frame_for_velocities_that_is_neither_base_nor_tool_is_refused():
         Params(twist_frame_id='world')
 
 
-@pytest.mark.parametrize('noise_n', [0.003, 0.02])
-@pytest.mark.parametrize('lag_s', [0.02, 0.05])
-@pytest.mark.parametrize('stiffness_n_m', [600.0, 2000.0, 20000.0])
+@pytest.mark.parametrize(
+    ('stiffness_n_m', 'lag_s', 'noise_n'),
+    [(600.0, 0.02, 0.003), (600.0, 0.05, 0.02), (2000.0, 0.05, 0.003), (20000.0, 0.02, 0.02), (20000.0, 0.05, 0.003)],
+)
 def test_the_force_is_kept_from_a_thirtieth_of_the_declared_stiffness_on(stiffness_n_m, lag_s, noise_n):
     emulated = {'lag_s': lag_s, 'stiffness_n_m': stiffness_n_m, 'start_height_m': 0.002, 'force_noise_n': noise_n}
     declared = {'max_stiffness_n_m': 20000.0, 'loop_delay_s': lag_s, 'touching_n': max(0.03, 6.0 * noise_n)}
@@ -692,8 +693,10 @@ LIES = {
 }
 
 
-@pytest.mark.parametrize('stiffness_n_m', [2000.0, 20000.0])
-@pytest.mark.parametrize('lie', LIES)
+# A wall also where it is soft; the whole range is swept by the benchmark of motions.
+@pytest.mark.parametrize(
+    ('lie', 'stiffness_n_m'), [*((lie, 20000.0) for lie in LIES), *((lie, 2000.0) for lie in LIES if 'wall' in lie)]
+)
 def test_no_hidden_force_follows_from_what_is_not_as_the_arm_is_told(lie, stiffness_n_m, record_property):
     emulated, given, most_n, message = LIES[lie]
     params = {key: value for key, value in given.items() if key.startswith('surface')}

@@ -21,6 +21,7 @@ from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.ros_controllers import RosControllersArm
 from texture_exploration.arms.tool_state import RosControllersParams
 from texture_exploration.explorer import Explorer
+from texture_exploration.ros import controllers
 from texture_exploration.safety import SafetyLimits
 from texture_exploration.touch import TouchParams
 
@@ -48,6 +49,12 @@ DEADLINE_S = 60.0
 def graph():
     with LocalGraph(94, deadline_s=DEADLINE_S) as graph:
         yield graph
+
+
+@pytest.fixture(autouse=True)
+def discovery(monkeypatch):
+    """Wait for other commanders as long as this machine needs; how long it is in fact is in test_..._hand_over."""
+    monkeypatch.setattr(controllers, 'ALONE_S', 1.0)
 
 
 @pytest.fixture(scope='module')
@@ -117,22 +124,16 @@ def test_a_second_explorer_is_refused_and_does_not_disturb_the_first(controller,
         assert exploration.outcome.success, exploration.outcome.message
 
 
-@pytest.mark.parametrize(('blink_s', 'must_be_seen'), [(0.006, False), (0.1, True)])
-def test_a_blink_of_the_subscription_in_the_slide_lifts_the_finger(
-    graph, controller, make_explorer, blink_s, must_be_seen
-):
-    """One of 6 ms falls between two looks of the arm now and then, and does nothing."""
+def test_a_blink_of_the_subscription_in_the_slide_lifts_the_finger(graph, controller, make_explorer):
     explorer = make_explorer()
     explorer.connect()
     client = graph.peer.create_client(SetParameters, 'twist_controller/set_parameters')
     graph.until(client.service_is_ready)
-    blink = SetParameters.Request(parameters=[Parameter('blink_s', value=blink_s).to_parameter_msg()])
+    blink = SetParameters.Request(parameters=[Parameter('blink_s', value=0.1).to_parameter_msg()])
     exploration, since_ns = explored(explorer, lambda: client.call_async(blink))
     assert since_ns, exploration.outcome
     assert exploration.outcome.lifted, exploration.outcome.message
-    assert not (must_be_seen and exploration.outcome.success)
-    if not exploration.outcome.success:
-        assert 'for a moment no node subscribed' in exploration.outcome.message
+    assert 'for a moment no node subscribed' in exploration.outcome.message
 
 
 # From here on processes are killed, after which discovery stalls for seconds: no test that follows looks for another.
@@ -162,7 +163,7 @@ def test_a_finger_that_a_killed_explorer_left_pressed_is_lifted_on_request_befor
     assert height_m > 0.001
 
 
-def test_a_controller_that_dies_in_the_slide_is_named_and_the_next_request_connects_again(
+def test_a_controller_that_dies_in_the_slide_is_named_and_one_that_is_interrupted_waits_for_the_lift(
     controller, make_explorer, record_property
 ):
     explorer = make_explorer()
@@ -173,11 +174,21 @@ def test_a_controller_that_dies_in_the_slide_is_named_and_the_next_request_conne
     # It shows by what comes first: no pose, no force, no subscriber, or no motion.
     assert re.search('no (pose|force) has arrived|no node|controller on .* is not active', exploration.outcome.message)
     record_property('detected_s', (exploration.state.stamp_ns - since_ns) * 1e-9)
-    with NodeProcess('texture_simulation', 'twist_controller', HELD):
+    with NodeProcess('texture_simulation', 'twist_controller', HELD) as second:
         # Until its lease ends, the dead controller counts as a listener: on a busy machine the first commands may be
         # sent before the new one hears them, and the exploration is aborted by name.
         again = []
         while not (again and again[-1].success) and len(again) < 3:
             again.append(explored(explorer)[0].outcome)
+        assert again[-1].success, again
+
+        # One that is interrupted with the explorer, as by Ctrl-C in a launch, lets it lift the finger first.
+        def interrupt():
+            second.process.send_signal(signal.SIGINT)
+            explorer.stop('interrupted')
+
+        exploration, since_ns = explored(explorer, interrupt)
+        assert since_ns, exploration.outcome
+        assert (exploration.outcome.message, exploration.outcome.lifted) == ('interrupted', True)
         explorer.close()
-    assert again[-1].success, again
+        assert second.wait(DEADLINE_S) == 0

@@ -149,6 +149,38 @@ def test_a_slide_commands_force_and_speed_by_turns_and_ends_with_the_finger_lift
     assert link.robot.pressing_n == 0.0
 
 
+def test_a_wall_in_the_slide_is_met_gently_and_left_again():
+    link, limits, forces_n = SteppedLink([], wall_m=0.02, stop_force_n=1e5), SafetyLimits(), []
+    explorer = Explorer(link.arm, TouchParams(), limits, lambda _state: None, lambda: link.now_ns)
+
+    def pace():
+        link.pace()
+        forces_n.append(np.linalg.norm(link.robot.force))
+
+    request = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=5.0, distance_m=0.06)
+    outcome = explorer._prepare('one', request).run(pace)
+    assert (outcome.success, outcome.lifted) == (False, True)
+    assert 'along the surface' in outcome.message
+    assert max(forces_n) < limits.force_limit_n + 20000.0 * 0.08 * 0.05  # 80 ms from the first contact to a standstill
+    assert sum(force_n > limits.force_limit_n for force_n in forces_n) <= 10  # steps of 10 ms
+    assert forces_n[-1] < 0.5
+
+
+def test_an_arm_that_does_not_follow_in_the_slide_has_stalled():
+    link = SteppedLink([])
+    explorer = Explorer(link.arm, TouchParams(), SafetyLimits(), lambda _state: None, lambda: link.now_ns)
+
+    def pace():
+        link.pace()
+        if link.arm.state().position[0] > 0.01:
+            link.robot.speed_fraction = 0.15
+
+    request = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=3.0, distance_m=0.04)
+    outcome = explorer._prepare('one', request).run(pace)
+    assert outcome.message.startswith('the finger stalled: in 250 ms it moved by')
+    assert outcome.lifted
+
+
 @pytest.mark.parametrize('where', ['before the wall', 'before the way back is sent'])
 @pytest.mark.parametrize('paused_s', [0.15, 0.2, 0.3])
 def test_an_explorer_that_was_paused_at_a_wall_leads_the_finger_back_from_it(paused_s, where):
@@ -304,8 +336,10 @@ def test_without_ur_rtde_the_sentence_says_what_to_install(monkeypatch):
         UrArm().connect()
 
 
-def test_an_arm_that_was_never_connected_says_so():
+def test_an_arm_that_was_never_connected_says_so_and_a_cb3_that_it_only_estimates_forces():
     arm = UrArm()
+    arm._series = ur_probe.CB3
+    assert 'is a CB3, which estimates forces within about 10 N' in arm.warning()
     for call in (arm.state, arm.stop, lambda: arm.command(ArmCommand((0.02, 0.0)))):
         with pytest.raises(DeviceError, match='connect it first'):
             call()

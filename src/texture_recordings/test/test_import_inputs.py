@@ -595,7 +595,7 @@ def h5_of_holes(folder: Path) -> None:
 
 SIZES: dict[str, tuple[Write, str]] = {
     'cells': (mat(matlab(1, 400_000_000)), 'declares more than 8 million values'),
-    'cells in a cell': (mat(matlab(1, 1, matlab(1, 400_000_000, name=b''))), "'cork_1.mat' cannot be read"),
+    'cells in a cell': (mat(matlab(1, 1, matlab(1, 40_000_000, name=b''))), "'cork_1.mat' cannot be read"),
     'numbers': (mat(matlab(6, 2_000_000_000, element(9, bytes(80)))), 'declares more than 8 million values'),
     'no rows': (h5_without_rows, 'declares more than 8 million values'),
     'a header': (csv(names=','.join(f'x{number}' for number in range(20_000))), 'has 20000 columns; at most 10000'),

@@ -137,7 +137,6 @@ CASES: Mapping[str, RigCase] = {
 
 DEADLINE_S = 30.0
 STEP_S = 0.003
-MAX_TICKS_PER_S = 5000.0  # beyond this rate as many
 MAX_AT_ONCE_S = 0.04  # after a stall of the machine the line's buffer must not run over
 
 
@@ -183,7 +182,7 @@ class Rig:
         self.device.unplug()
 
     def _run(self) -> None:
-        done, most = 0, max(1, round(MAX_AT_ONCE_S * min(self.case.ticks_per_s, MAX_TICKS_PER_S)))
+        done, most = 0, max(1, round(MAX_AT_ONCE_S * self.case.ticks_per_s))
         while not self._stop.wait(STEP_S):
             due = int((time.time_ns() - self.start_ns) / NANOSECONDS * self.case.ticks_per_s * self._pace)
             ticks = min(due - done, most)

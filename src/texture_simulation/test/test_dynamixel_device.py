@@ -51,23 +51,12 @@ def test_the_checksum_is_that_of_the_protocol():
     assert packet(1, 1) == PING_1
 
 
-def test_a_ping_answers_with_the_model_and_in_pieces(bus):
+def test_a_ping_in_pieces_is_answered_with_the_model_and_noise_with_nothing(bus):
+    assert bus.receive(b'\x00\xff' + PING_1[:-1] + b'\x00') == b''
     assert bus.receive(PING_1[:4]) == b''
     answer = bus.receive(PING_1[4:])
     assert answer[4] == 1
     assert struct.unpack('<H', answer[9:11])[0] == 1240
-
-
-def test_noise_and_a_wrong_checksum_get_no_answer(bus):
-    assert bus.receive(b'\x00\xff' + PING_1[:-1] + b'\x00') == b''
-    assert bus.receive(PING_1)
-
-
-def test_the_mode_cannot_be_changed_under_torque(bus):
-    bus.receive(write(1, 64, 1, 1))
-    assert bus.receive(write(1, 11, 5, 1))[8] == 7
-    bus.receive(write(1, 64, 0, 1))
-    assert bus.receive(write(1, 11, 5, 1))[8] == 0
 
 
 def test_a_sync_read_ends_at_the_first_that_is_silent(bus):
@@ -154,6 +143,8 @@ def test_what_a_motor_refuses_it_answers_and_does_not_do(bus):
     assert error_of(bus, write(1, 102, 1, 1)) == LENGTH
     assert error_of(bus, write(1, 126, 1, 2)) == ACCESS  # what is measured
     assert error_of(bus, packet(1, 0x77)) == 2  # no such instruction
+    bus.receive(write(1, 64, 1, 1))
+    assert error_of(bus, write(1, 11, 5, 1)) == ACCESS  # its mode, under torque
     bus.receive(packet(0xFE, 0x83, struct.pack('<HHBHBH', 102, 2, 1, 1751, 2, 100)))
     assert (read(bus, 1, 102, '<h'), read(bus, 2, 102, '<h')) == (1750, 100)
 

@@ -29,6 +29,8 @@ FAMILIES = (*NUMBERED, 'anyskin')
 CHECKED = ('biotac', 'daq', 'pvdf')  # have a checksum on the line
 # Of a slow device; the same number of faults in the time of the test.
 FAULT_RATES = {'anyskin': 2e-3}
+SILENT = {'daq': 'sends nothing', 'tsf85': 'sends nothing, started', 'biotac': 'sends no complete frames'}
+WRONG = {'tsf85': 'no known packet', 'anyskin': 'no valid frame'}
 Make = Callable[..., Rig]
 
 
@@ -130,7 +132,9 @@ def test_a_device_that_opens_and_stays_silent_is_reported_by_its_path(make: Make
     rig.set(silent=True)
     rig.sensor.open()
     began_s = time.monotonic()
-    assert str(rig.link) in rig.fault()
+    fault = rig.fault()
+    assert str(rig.link) in fault
+    assert SILENT.get(name, '') in fault
     assert time.monotonic() - began_s < 10.0
     rig.set(silent=False)
     assert rig.signal_s(0.1)
@@ -141,19 +145,16 @@ def test_wrong_firmware_is_an_error_and_none_of_it_is_published(make: Make, name
     rig = make(name)
     rig.set(wrong_firmware=True)
     rig.sensor.open()
-    assert rig.fault()
+    assert WRONG.get(name, '') in rig.fault()
     assert rig.sensor.counts['samples'] == 0
 
 
 @pytest.mark.parametrize('name', FAMILIES)
-@pytest.mark.parametrize('kinds', [('drop', 'insert'), ('flip',)], ids=', '.join)
-def test_bytes_lost_added_or_changed_are_counted_and_no_sample_moves(
-    make: Make, name: str, kinds: tuple[str, ...]
-) -> None:
+def test_bytes_lost_added_or_changed_are_counted_and_no_sample_moves(make: Make, name: str) -> None:
     rig = make(name)
     rig.sensor.open()
     batches = rig.signal_s(0.1)
-    rig.set(faults=ByteFaults(**dict.fromkeys(kinds, FAULT_RATES.get(name, 6e-4))))
+    rig.set(faults=ByteFaults(**dict.fromkeys(('drop', 'insert', 'flip'), FAULT_RATES.get(name, 4e-4))))
     batches += rig.signal_s(1.0)
     offsets = rig.offsets(batches)
     right = np.bincount(offsets.astype(int)).max()
@@ -210,8 +211,8 @@ def test_after_a_brown_out_of_the_device_the_index_goes_on_with_the_time(make: M
     assert (last.first_sample - first.first_sample) / rig.case.rate_hz == pytest.approx(elapsed_s, abs=0.05)
 
 
-# One clock serves all; these are read by numbers, by times, and by arrivals.
-@pytest.mark.parametrize('name', ['tsf85', 'daq', 'anyskin'])
+# One clock serves all; this one has neither numbers nor times in its packets.
+@pytest.mark.parametrize('name', ['anyskin'])
 def test_a_clock_that_drifts_is_followed_and_reported(make: Make, name: str) -> None:
     rig = make(name, pace=1.004)
     rig.sensor.open()

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sensor_rig import CASES, Rig, biotac, counting
+from sensor_rig import CASES, Feed, Rig, biotac, counting
 
 from texture_core.types import lost_samples
 from texture_drivers.biotac import BioTac
@@ -65,12 +65,10 @@ def test_words_damaged_on_the_board_are_nan_and_no_neighbour_moves(open_rig: Mak
     assert rig.sensor.counts['damaged_words'] > 0
 
 
-def test_the_serial_number_is_reported_and_a_silent_bridge_is_an_error_with_advice(open_rig: Make) -> None:
+def test_the_serial_number_is_reported(open_rig: Make) -> None:
     rig = board(open_rig)
     rig.signal_s(1.5)
     assert rig.sensor.details['serial of finger 0'] == 'BT-0'
-    rig.set(silent=True)
-    assert 'sends no complete frames' in rig.fault()
 
 
 def test_all_fingers_of_a_board_have_separate_topics(open_rig: Make) -> None:
@@ -115,6 +113,37 @@ def test_a_device_never_waits_for_a_host_that_does_not_read(tmp_path: Path) -> N
         device.measure({'signal': counting(first, 100, 30_000, 8, 1)})
     assert device.dropped_bytes > 50_000
     device.unplug()
+
+
+def test_the_channels_keep_their_order(open_rig: Make) -> None:
+    def feed(device: Any, first: int, ticks: int) -> None:
+        counts = counting(first, ticks, 30_000, 8, 1) * np.array([1, 0, 0, 0, 0, 0, 0, -1])[:, None]
+        device.measure({'signal': counts})
+
+    last = open_rig('daq', feed=feed).signal_s(0.5)[-1]
+    assert last.samples[0, 0] > 0
+    np.testing.assert_array_equal(last.samples[:, 7], -last.samples[:, 0])
+
+
+def swing(device: Any, first: int, ticks: int) -> None:
+    """Feed a film that swings at 50 Hz, and a force that rises."""
+    numbers = np.arange(first, first + ticks)[:, None, None]
+    film = 1000 * np.sin(2 * np.pi * 50 / 4096 * numbers)
+    device.measure({'signal': film, 'signal_static': numbers[numbers[:, 0, 0] % 64 == 0] // 64 % 3000})
+
+
+SWING: dict[str, Feed] = {'feed': swing}
+
+
+def test_film_and_force_come_as_two_streams_in_their_units(open_rig: Make) -> None:
+    topics = open_rig('pvdf', config='', **SWING).read_s(1.0)
+    film, force = topics['signal'], topics['signal_static']
+    assert lost_samples(film) == lost_samples(force) == 0
+    assert (film[0].sensor, film[0].units, film[0].sampling_rate_hz) == ('pvdf/film', ('pC',), 4096.0)
+    assert (force[0].sensor, force[0].units, force[0].sampling_rate_hz) == ('pvdf/force', ('N',), 64.0)
+    charge = np.concatenate([batch.samples for batch in film])
+    assert charge.max() == pytest.approx(2.0, rel=0.01)  # 1000 counts of 0.002 pC
+    assert np.diff(np.concatenate([batch.samples for batch in force]), axis=0) == pytest.approx(0.005, abs=1e-6)
 
 
 def test_the_public_client_of_the_vendor_reads_each_packet_of_the_tsf85(tmp_path: Path) -> None:

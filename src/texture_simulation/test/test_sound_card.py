@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +13,7 @@ import pytest
 from texture_core.errors import DeviceError, InvalidParameter
 from texture_core.types import TactileSignal, lost_samples
 from texture_drivers.sensor import SensorParams
-from texture_drivers.sound_card import NULL, AudioBlock, SoundCard
+from texture_drivers.sound_card import NULL, SoundCard
 
 pytestmark = pytest.mark.realtime
 
@@ -96,39 +95,18 @@ def test_a_card_that_is_not_there_is_named_with_those_that_are() -> None:
         SoundCard(SensorParams(device='no such card')).open()
 
 
-class Blocks:
-    """A mock of the capture: hands over blocks on request."""
-
-    def __init__(self) -> None:
-        self.waiting: list[AudioBlock] = []
-
-    def take(self) -> list[AudioBlock]:
-        taken, self.waiting = self.waiting, []
-        return taken
-
-    def close(self) -> None: ...
-
-
-def by_hand(
-    late_s: Callable[[int], float], overflows: frozenset[int] = frozenset(), count: int = 200
-) -> tuple[SoundCard, list[Any]]:
-    """Return a sensor that has read blocks of 10 ms, so late each, some with an overflow, and its batches."""
-    sensor = SoundCard(SensorParams(config='{decimation: 1}', batch_s=0.001))
-    blocks = Blocks()
-    sensor._capture = blocks  # type: ignore[assignment]
-    batches: list[Any] = []
-    for number in range(count):
-        end_ns = 10**18 + round(((number + 1) * 480 / RATE_HZ + late_s(number)) * 1e9)
-        blocks.waiting.append(AudioBlock(np.zeros((480, 1), dtype=np.float32), end_ns, number in overflows))
-        if number % 5 == 4:
-            batches += sensor.read().get('signal', [])
-    return sensor, batches
-
-
-def test_an_overflow_is_counted_and_its_samples_are_left_out_of_the_index() -> None:
-    sensor, batches = by_hand(lambda number: 0.05 * (number >= 50), frozenset({50}))
-    assert sensor.counts['overflows'] == 1
-    assert lost_samples(batches) == sensor.counts['lost'] == pytest.approx(2400, abs=5)
+def test_a_reader_that_is_too_busy_is_an_overflow_and_the_time_goes_on(make: Callable[..., SoundCard]) -> None:
+    sensor = make()
+    last = read_s(sensor, 0.3)[-1]
+    deadline_s = time.monotonic() + DEADLINE_S
+    while not sensor._capture._overflowed:  # type: ignore[union-attr]
+        assert time.monotonic() < deadline_s
+        time.sleep(0.01)
+    batches = read_s(sensor, 1.5)
+    assert sensor.counts['overflows'] >= 1
+    assert sensor.counts['lost'] > 0
+    elapsed_s = (batches[-1].stamp_ns - last.stamp_ns) / 1e9
+    assert (batches[-1].first_sample - last.first_sample) / RATE_HZ == pytest.approx(elapsed_s, abs=0.05)
 
 
 def test_a_decimation_that_does_not_divide_the_rate_is_refused() -> None:
