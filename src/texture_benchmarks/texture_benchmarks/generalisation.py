@@ -688,6 +688,6 @@ def _draw_bars(axes: Any, rows: Mapping[str, Mapping[str, Any]], title: str) -> 
     for label, look in (
         ('accepted and correct', {'color': 'grey'}),
         ('correct, rejected', {'color': 'grey', 'alpha': 0.35}),
-        ('accepted but wrong (SVC: wrong)', {'color': 'black'}),
+        ('accepted but wrong (peers: wrong)', {'color': 'black'}),
     ):
         axes.barh(0, 0, label=label, **look)
