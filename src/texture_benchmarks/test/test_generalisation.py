@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_benchmarks import generalisation
+from texture_benchmarks import generalisation, peers
 from texture_benchmarks.generalisation import (
     DECIDED,
     DISTANCE,
@@ -86,6 +86,15 @@ def test_a_control_tells_surfaces_that_were_slid_over_in_different_directions() 
     [(cell, answers)] = answers_of('t', (made, trials), 0, recipe_of, 'direction alone')
     assert cell == ('halves', 'same', '')
     assert all(one.ends[END][0] == one.surface for one in answers)
+
+
+def test_a_peer_answers_for_slides_that_have_a_window(monkeypatch) -> None:
+    monkeypatch.setitem(peers.CLASSIFIERS, 'a peer', 'sklearn.dummy:DummyClassifier')  # the most frequent label
+    signals = [np.zeros((round(seconds * RATE_HZ), 1)) for seconds in (2.0, 1.0, 0.3)]
+    made = SlideDataset.from_arrays({'signal': signals}, ['cork', 'felt', 'felt'], {'signal': RATE_HZ})
+    names = made.names.tolist()
+    [(_, answers)] = answers_of('t', (made, [Trial('', names, {(HALVES, 'a row'): names})]), 0, recipe_of, 'a peer')
+    assert [(one.surface, *one.ends[END]) for one in answers] == [('cork', 'cork', True), ('felt', 'cork', True)]
 
 
 def test_what_is_trained_from_either_end_lies_in_no_test_of_another_stretch() -> None:

@@ -189,7 +189,8 @@ def answers_of(
         fit: Callable[[Sequence[str]], Tested] = partial(_control, slides, CONTROLS[name])
     elif name in peers.CLASSIFIERS:
         topics = sorted(dataset[0].signals)
-        windows = {key: peers.windows_of(one, topics, PEER_WINDOWS) for key, one in slides.items()}
+        cut = {key: peers.windows_of(one, topics, PEER_WINDOWS) for key, one in slides.items()}
+        windows = {key: found for key, found in cut.items() if len(found)}  # some parts of a track are shorter than one
         fit = partial(_peer, slides, windows, name, seed)
     else:
         long = dataset[0].sliding[-1].stamp_ns - dataset[0].sliding[0].stamp_ns > LONG_NS
@@ -235,11 +236,18 @@ def _peer(
     slides: Mapping[str, LabelledSlide], windows: Mapping[str, Any], name: str, seed: int, trained: Sequence[str]
 ) -> Tested:
     """Return what a peer answers by the sum of the logarithms of its probabilities over the windows of a slide."""
-    fitted = peers.classifier(name, seed)
-    labels = np.concatenate([np.repeat(slides[one].surface, len(windows[one])) for one in trained])
-    fitted.fit(np.concatenate([windows[one] for one in trained]), labels)
-    votes = {one: np.log(fitted.predict_proba(windows[one]) + 1e-9).sum(axis=0) for one in slides}
-    return lambda names: {one: ({END: (str(fitted.classes_[votes[one].argmax()]), True)}, '') for one in names}
+    fitted, kept = peers.classifier(name, seed), [one for one in trained if one in windows]
+    labels = np.repeat([slides[one].surface for one in kept], [len(windows[one]) for one in kept])
+    fitted.fit(np.concatenate([windows[one] for one in kept]), labels)
+
+    def test(names: Sequence[str]) -> Mapping[str, tuple[Mapping[str, tuple[str, bool]], str]]:
+        tested = [one for one in names if one in windows]
+        found = np.log(fitted.predict_proba(np.concatenate([windows[one] for one in tested])) + 1e-9)
+        starts = np.cumsum([0, *(len(windows[one]) for one in tested[:-1])])
+        best = fitted.classes_[np.add.reduceat(found, starts).argmax(axis=1)]
+        return {one: ({END: (str(label), True)}, '') for one, label in zip(tested, best, strict=True)}
+
+    return test
 
 
 def _control(
@@ -683,6 +691,6 @@ def _draw_bars(axes: Any, rows: Mapping[str, Mapping[str, Any]], title: str) -> 
     for label, look in (
         ('accepted and correct', {'color': 'grey'}),
         ('correct, rejected', {'color': 'grey', 'alpha': 0.35}),
-        ('accepted but wrong (SVC: wrong)', {'color': 'black'}),
+        ('accepted but wrong (peers: wrong)', {'color': 'black'}),
     ):
         axes.barh(0, 0, label=label, **look)

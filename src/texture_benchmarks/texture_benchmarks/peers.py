@@ -60,7 +60,7 @@ def classifier(name: str, seed: int) -> Any:
 
 
 def windows_of(slide: LabelledSlide, topics: Sequence[str], windows: WindowParams = WINDOWS) -> AnyArray:
-    """Return the windows of a slide, (n, n_channels, n_samples); slow channels keep each value until the next."""
+    """Return the windows of a slide, (n, n_channels, n_samples), none of a short one; slow channels keep each value."""
     signals = {topic: slide.signals[topic] for topic in topics}
     found = []
     for event in cut_recording(signals, slide.states, windows):
@@ -68,7 +68,7 @@ def windows_of(slide: LabelledSlide, topics: Sequence[str], windows: WindowParam
             count = len(event.windows[topics[0]].samples)
             parts = [event.windows[topic].samples for topic in topics]
             found.append(np.concatenate([one[np.arange(count) * len(one) // count] for one in parts], axis=1).T)
-    return np.stack(found).astype(np.float32)
+    return np.array(found, dtype=np.float32)
 
 
 def right_over_time(votes: Array, code: int) -> list[bool]:
