@@ -16,6 +16,7 @@ from texture_core.errors import CommandRefused, DeviceError
 from texture_core.ros_testing import NodeProcess
 from texture_exploration.arms.arm import Arm, ArmCommand
 from texture_exploration.arms.catalogue import ARMS
+from texture_simulation.devices.dynamixel import EmulatedDynamixelBus, leap_hand
 from texture_simulation.devices.rails import EmulatedRails
 from texture_simulation.devices.ur import ControllerProcess, UrControllerParams
 
@@ -36,6 +37,13 @@ def emulated_rails():
 
 
 @contextlib.contextmanager
+def emulated_hand():
+    pytest.importorskip('dynamixel_sdk', reason='dynamixel-sdk is not installed')
+    with tempfile.TemporaryDirectory() as folder, EmulatedDynamixelBus(Path(folder) / 'bus', leap_hand()) as bus:
+        yield {'device': str(bus.port.link), 'grip_timeout_s': 20.0}
+
+
+@contextlib.contextmanager
 def emulated_controllers():
     pytest.importorskip('rclpy', reason='there is no ROS here')
     domain = {'ROS_DOMAIN_ID': '92'}
@@ -47,6 +55,7 @@ def emulated_controllers():
 
 DEVICES = {
     'ros_controllers': emulated_controllers,
+    'hand': emulated_hand,
     'ur': ur_controller,
     'rails': emulated_rails,
 }  # what must be there for an arm, and the parameters that lead to it
