@@ -7,6 +7,7 @@ import socket
 from pathlib import Path
 
 import pytest
+from aiohttp import ClientSession, WSMsgType
 from aiohttp.test_utils import TestClient, TestServer
 
 from texture_bringup import dashboard
@@ -240,6 +241,20 @@ def test_a_port_in_use_is_reported_and_nothing_is_left_running() -> None:
         first.show('{}')
     finally:
         first.close()
+
+
+def test_the_server_ends_while_a_page_is_open() -> None:
+    serving = Serving(make_app(Nodes(), Access('127.0.0.1'), PAGE), '127.0.0.1', 0)
+
+    async def watch():
+        async with ClientSession() as session, session.ws_connect(f'http://127.0.0.1:{serving.port}/ws') as page:
+            serving.show('{}')
+            assert await page.receive_json() == {}
+            closing = asyncio.create_task(asyncio.to_thread(serving.close))
+            assert (await page.receive()).type is WSMsgType.CLOSE
+            await closing  # raises if the loop of the server still runs
+
+    asyncio.run(asyncio.wait_for(watch(), DEADLINE_S))
 
 
 def test_what_cannot_be_recorded_is_reported_and_nothing_is_left_to_end(tmp_path) -> None:

@@ -99,6 +99,10 @@ def test_the_security_policy_allows_all_that_the_nodes_use_and_nothing_moves_whe
     assert {'/signal', '/explore', '/explore/_action/send_goal', '/roughness_features'} <= names
     assert [name for name in names if not any(fnmatch(name, pattern) for pattern in allowed)] == []
     assert operator.stop() == 'nothing is moving'
+    operators = policy.find("enclaves/enclave[@path='/tactile_texture/operator']")
+    called = {item.text for item in operators.iter('service')}
+    # What `texture activate` calls.
+    assert {f'/{one}/{name}_state' for one in ('sensor', 'explorer') for name in ('get', 'change')} <= called
 
 
 def test_without_a_model_an_exploration_ends_well_says_what_is_missing_and_is_graded(operator) -> None:

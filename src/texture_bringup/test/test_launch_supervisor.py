@@ -11,6 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from texture_bringup.launcher import ending_with_parent
+from texture_core.errors import LaunchFailed
+
 pytestmark = pytest.mark.realtime
 
 GOOD = 'trap "exit 0" INT TERM; echo "ready $$"; while :; do sleep 0.05; done'
@@ -23,10 +26,10 @@ class Launched:
     """A running launcher."""
 
     def __init__(self, file: Path, prefix: Path, options: tuple[str, ...], program: tuple[str, ...]) -> None:
-        environment = {**os.environ, 'AMENT_PREFIX_PATH': str(prefix), 'TMPDIR': str(prefix)}
-        command = [*program, sys.executable, '-m', 'texture_bringup.command', 'launch', *options, str(file)]
+        self.environment = {**os.environ, 'AMENT_PREFIX_PATH': str(prefix), 'TMPDIR': str(prefix)}
+        self.command = [*program, sys.executable, '-m', 'texture_bringup.command', 'launch', *options, str(file)]
         self.process = subprocess.Popen(
-            command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+            self.command, env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
         )
         self.lines = []
 
@@ -187,13 +190,14 @@ def test_together_the_death_of_any_node_stops_all_and_none_is_restarted(launch) 
     assert all(gone(pid) for pid in pids)
 
 
-# As the demonstration does; PARENT is its process.
-PROGRAM = ('sh', '-c', 'set -- $(echo "$@" | sed "s/PARENT/$$/"); "$@" & wait', 'sh')
+# As the demonstration does.
+RUN = 'import subprocess, sys; from texture_bringup.launcher import ending_with_parent as ending; '
+PROGRAM = (sys.executable, '-c', RUN + 'subprocess.run(ending("INT", sys.argv[1:]))')
 
 
-@pytest.mark.parametrize(('program', 'options'), [((), ()), (PROGRAM, ('--parent', 'PARENT'))])
-def test_nodes_end_with_a_launcher_or_with_its_program_that_is_killed(launch, program, options) -> None:
-    launched = launch({'good': GOOD}, *options, program=program)
+@pytest.mark.parametrize('program', [(), PROGRAM])
+def test_nodes_end_with_a_launcher_or_with_its_program_that_is_killed(launch, program) -> None:
+    launched = launch({'good': GOOD}, '--together', program=program)
     pid = launched.ready()
     launched.process.kill()
     assert gone(pid)
@@ -211,3 +215,36 @@ def test_nodes_are_stopped_when_nobody_reads_the_output_any_more(launch) -> None
     launched.process.stdout.close()
     assert gone(pid)
     assert launched.process.wait(DEADLINE_S) == 0
+
+
+def test_nodes_are_stopped_when_the_disk_that_takes_the_output_is_full(launch) -> None:
+    first = launch({'good': GOOD})
+    with Path('/dev/full').open('w') as full:  # ends with 0 once all nodes have ended
+        subprocess.run(first.command, check=True, env=first.environment, stdout=full, timeout=DEADLINE_S)
+
+
+def test_a_letter_that_the_output_cannot_show_is_written_by_its_code(launch, monkeypatch) -> None:
+    monkeypatch.setenv('PYTHONIOENCODING', 'ascii')
+    launched = launch({'good': f"printf 'caf\\303\\251\\n'; {GOOD}"})
+    pid = launched.ready()
+    assert any('caf\\xe9' in line for line in launched.lines)
+    launched.process.send_signal(signal.SIGINT)
+    assert launched.end() == 0
+    assert gone(pid)
+
+
+def test_processes_that_left_the_group_of_their_node_hold_nothing_up(launch) -> None:
+    launched = launch({'good': GOOD, **dict.fromkeys('abcd', 'setsid sleep 10 & exit 3')})
+    launched.wait_for('started')
+    began_s = time.monotonic()
+    for _ in 'abcd':
+        launched.wait_for('died with exit code 3')
+    assert time.monotonic() - began_s < 3.0  # not one second for each
+    launched.process.send_signal(signal.SIGINT)
+    assert launched.end() == 1
+
+
+def test_a_missing_setpriv_is_named(monkeypatch) -> None:
+    monkeypatch.setenv('PATH', '')
+    with pytest.raises(LaunchFailed, match='install the package util-linux'):
+        ending_with_parent('INT', ['true'])

@@ -123,6 +123,7 @@ def test_the_models_are_good_and_the_figures_are_written(data, capsys, tmp_path)
         ('launch emulator model:=nowhere', "there is no model 'nowhere'"),
         ('launch emulator model:=pipe', "there is no card 'pipe.json' of 'pipe'"),
         ('launch replay', 'give bag:=VALUE'),
+        ('launch replay bag:=nowhere', "there is no bag 'nowhere'"),
         ('replay glass --rate nan', "parameter 'rate' is nan; allowed is 0.01 to 1000.0"),
         ('list sensor', "did you mean 'sensors'?"),
         ('info nowhere', "there is no bag 'nowhere'"),

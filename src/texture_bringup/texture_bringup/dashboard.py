@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-from aiohttp import WSCloseCode, web
+from aiohttp import WSCloseCode, WSMsgType, web
 
 from texture_bringup.launcher import ChildLauncher
 from texture_core.config import parse_json
@@ -189,6 +189,7 @@ HEARTBEAT_S = 10.0
 NEWS_S = 0.03  # how often it is looked whether there is a new frame
 REQUEST_S, LOOK_S = 15.0, 1.0  # that a request may take to come, and how often that is looked at
 SERVER_CLOSING_S = 1.0
+ENDS = (WSMsgType.CLOSE, WSMsgType.CLOSING, WSMsgType.CLOSED, WSMsgType.ERROR)
 PAGE: Mapping[str, tuple[str, str]] = {
     '/': ('index.html', 'text/html'),
     '/dashboard.js': ('dashboard.js', 'text/javascript'),
@@ -231,7 +232,10 @@ class Viewers:
                     sent = self._number
                     await socket.send_str(self._frame)
                 with contextlib.suppress(asyncio.TimeoutError):
-                    await socket.receive(NEWS_S)  # a page sends nothing; this detects when it closes
+                    # A page sends nothing; this detects when it closes. Of one that is being closed here, aiohttp 3.9
+                    # answers at once and is not closed yet.
+                    if (await socket.receive(NEWS_S)).type in ENDS:
+                        break
         except ConnectionError:  # it closed while a frame was sent
             pass
         finally:

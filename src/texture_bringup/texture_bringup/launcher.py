@@ -5,9 +5,11 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import re
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -41,9 +43,18 @@ from texture_core.errors import InvalidLaunch, LaunchFailed, TextureError, Unkno
 # A sub-command as a child process of another program, which watches and ends it.
 
 ChildT = TypeVar('ChildT', bound='Child')
-# The kernel sends a child the signal named behind this when its parent, or the thread that started it, has died.
-END_WITH_PARENT = ('setpriv', '--pdeathsig')
 STOP_DEADLINE_S = 30.0  # a launcher kills its nodes after 8 s, a recorder may be behind
+
+
+def ending_with_parent(number: str, command_line: Iterable[str]) -> list[str]:
+    """Return a command line whose process the kernel sends a signal when its parent, or that one's thread, has died.
+
+    A parent that has died before the kernel was asked is no longer the parent of what looks for it.
+    """
+    if shutil.which('setpriv') is None:
+        raise LaunchFailed("the program 'setpriv' is missing; install the package util-linux")
+    look = 'test "$PPID" = "$1" && shift && exec "$@"'
+    return ['setpriv', '--pdeathsig', number, 'sh', '-c', look, 'launch', str(os.getpid()), *command_line]
 
 
 class Child:
@@ -51,7 +62,8 @@ class Child:
 
     def __init__(self, arguments: Sequence[str], environment: Mapping[str, str], log: Path) -> None:
         self.log = log
-        self._command = [*END_WITH_PARENT, 'INT', sys.executable, '-m', 'texture_bringup.command', *arguments]
+        program = [sys.executable, '-m', 'texture_bringup.command']
+        self._command = ending_with_parent('INT', [*program, *arguments])
         self._environment = environment
         self._process: subprocess.Popen[bytes] | None = None
 
@@ -173,8 +185,9 @@ class RunningNode(subprocess.Popen[str]):
         self.signals = 0  # stop signals sent so far
         self.last = ''  # line that it wrote
         self._say = say
+        self._ended_s = math.inf
         super().__init__(
-            [*END_WITH_PARENT, 'TERM', *command_line],
+            ending_with_parent('TERM', command_line),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -194,8 +207,17 @@ class RunningNode(subprocess.Popen[str]):
             self.last = line.rstrip()
             self._say(f'[{self.node.label}] {self.last}')
 
+    def has_ended(self, now: float) -> bool:
+        """Return whether it has ended and its last lines are shown; end what it has started itself."""
+        if self.poll() is None:
+            return False
+        if self._ended_s == math.inf:
+            self._ended_s = now
+            self.send(signal.SIGKILL)
+        return not self._reader.is_alive() or now - self._ended_s > CLOSE_S
+
     def close(self) -> None:
-        """End what the process has started itself, and show what is left."""
+        """End it with what it has started itself, and show what is left."""
         self.send(signal.SIGKILL)
         self.wait()
         self._reader.join(CLOSE_S)
@@ -278,9 +300,8 @@ class Supervisor:
                 self._due.remove((when, node, deaths))
                 self._start(node, deaths)
         for process in list(self._running):
-            code = process.poll()
-            if code is not None:
-                self._end(process, code)
+            if process.has_ended(now):
+                self._end(process, process.returncode)
 
     def _start(self, node: NodeDescription, deaths: int) -> None:
         environment = dict(node.environment)
@@ -308,7 +329,6 @@ class Supervisor:
 
     def _end(self, process: RunningNode, code: int) -> None:
         self._running.remove(process)
-        process.close()
         node, stopping = process.node, self._stopping_since_s is not None
         # What was started wrongly would only end again.
         restart = node.respawn and code != MISTAKE and not (stopping or self._together)

@@ -49,12 +49,13 @@ LOOKED_AT = {
     'classifier': ('texture_estimation.model', 'load_model', 'model'),
     'roughness_estimator': ('texture_estimation.roughness', 'load_roughness_model', 'model'),
     'feature_extractor': ('texture_features.feature_set', 'FeatureSet.load', 'recipe'),
+    'replay': ('texture_recordings.bags', 'find_bags', 'bag'),
 }
 
 
 def _look_at(module: str, load: str, value: str, *surfaces: str) -> None:
     """Load what a node would load, and the surfaces of a scene; TextureError if they cannot be."""
-    loaded = attrgetter(load)(import_module(module))(value)
+    loaded = attrgetter(load)(import_module(module))([value] if load == 'find_bags' else value)
     for surface in surfaces:
         loaded.surface(surface)
 
@@ -80,8 +81,11 @@ def refuse_wrong(nodes: Sequence[NodeDescription], given: set[str]) -> None:
 def _say(line: str) -> None:
     try:
         print(f'{line}\n', end='', flush=True)  # in one piece: nodes write at the same time
-    except BrokenPipeError:
-        # Who read along has gone: nothing more can be shown, and the nodes are stopped in good order.
+    except UnicodeEncodeError:  # the encoding of the output lacks a letter
+        _say(ascii(line))
+    except OSError:
+        # Who read along has gone, or the disk is full: nothing more can be shown, and the nodes are stopped in good
+        # order. Not raised: the output of a node must be read to its end, or the node stands still.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         os.kill(os.getpid(), signal.SIGTERM)
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import queue
 import threading
 import time
@@ -17,8 +18,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from texture_core.config import param
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.ros import DiagnosticReport, Diagnostics, declare, run
-from texture_core.types import Quality
-from texture_recordings.bags import COMMON, MESSAGES, BagWriter, RawMessage, typestore
+from texture_core.types import Quality, TactileSignal
+from texture_recordings.bags import COMMON, MESSAGES, TYPES, BagWriter, RawMessage, decode, typestore
 from texture_recordings.ros import TOPICS, message_class
 
 QUEUE = 20_000  # a minute of one finger: a disk that stalls longer loses messages, and they are counted
@@ -52,6 +53,7 @@ class RecordNode(Node):
         self._path, self._all = params.out, params.all
         self._bag = BagWriter(params.out)
         self._counts: Counter[str] = Counter()
+        self._next_samples: dict[str, int] = {}  # by topic: index that its next batch begins with if nothing is lost
         self._queue: queue.Queue[RawMessage | None] = queue.Queue(QUEUE)
         self._error: OSError | None = None
         self._writer = threading.Thread(target=self._write, name='writer')
@@ -121,11 +123,21 @@ class RecordNode(Node):
                 if message is not NOTHING:
                     self._bag.write_raw(message)
                     self._counts['messages'] += 1
+                    self._count_lost(message)
                 if time.monotonic() - flushed_s >= FLUSH_S:
                     flushed_s = time.monotonic()
                     self._bag.flush()
             except OSError as error:  # noqa: PERF203 – a disk is slower
                 self._error = self._error or error
+
+    def _count_lost(self, message: RawMessage) -> None:
+        """Count the samples that are missing before a batch; an index that goes back is a restart of its driver."""
+        if message.msgtype == TYPES[TactileSignal]:
+            with contextlib.suppress(InvalidData):
+                signal = decode(message.data, message.msgtype)
+                first = self._next_samples.get(message.topic, signal.first_sample)
+                self._counts['lost'] += max(0, signal.first_sample - first)
+                self._next_samples[message.topic] = signal.next_sample
 
     def _next(self) -> RawMessage | None:
         try:
@@ -138,9 +150,10 @@ class RecordNode(Node):
             raise InvalidData(f"'{self._path}' cannot be written: {self._error}; free some space and record again")
 
     def _report(self) -> DiagnosticReport:
-        messages, dropped = self._counts['messages'], self._counts['dropped']
-        sentence = f'{messages} messages recorded, {dropped or "none"} dropped'
-        return 'WARN' if dropped else 'OK', sentence, {'messages': messages, 'dropped_messages': dropped}
+        messages, dropped, lost = (self._counts[name] for name in ('messages', 'dropped', 'lost'))
+        sentence = f'{messages} messages recorded, {dropped or "none"} dropped, {lost or "no"} samples lost'
+        numbers = {'messages': messages, 'dropped_messages': dropped, 'lost_samples': lost}
+        return 'WARN' if dropped or lost else 'OK', sentence, numbers
 
 
 def main() -> None:
