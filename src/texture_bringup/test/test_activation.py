@@ -3,6 +3,8 @@
 """An explorer moves its arm only while it is active."""
 
 import pytest
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 from std_srvs.srv import Trigger
 from texture_msgs import msg, srv
 
@@ -32,11 +34,15 @@ def test_an_explorer_refuses_until_it_is_active_and_lifts_lets_go_and_refuses_wh
     assert 'no control of the arm' in refused.result().result.message
     explorer.trigger_configure()
     explorer.trigger_activate()
+    change = graph.peer.create_client(ChangeState, 'explorer/change_state')
+    graph.until(change.service_is_ready)
     states = graph.listen(msg.ExplorationState, 'exploration')
     graph.until(lambda: states)
     exploration = explorer._explorer.begin('one', ExplorationRequest('linear_slide', speed_m_s=0.01, distance_m=0.1))
     graph.until(lambda: any(state.phase == msg.ExplorationState.PHASE_SLIDE for state in states))
-    explorer.trigger_deactivate()
+    deactivated = change.call_async(ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE)))
+    graph.until(deactivated.done)
+    assert deactivated.result().success
     assert exploration.ended.is_set()
     assert (exploration.outcome.success, exploration.outcome.message) == (False, 'the explorer released the arm')
     with pytest.raises(DeviceError, match='not connected'):

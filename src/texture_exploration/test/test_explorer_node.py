@@ -250,6 +250,18 @@ def test_an_arm_in_a_protective_stop_is_recovered_by_a_service(world):
     assert world.explored(**QUICK).error_code == OK
 
 
+def test_a_stop_in_the_slide_lifts_the_finger_and_answers_the_service_that_waits(world):
+    stop = world.peer.create_client(Trigger, 'explorer/stop')
+    world.until(stop.service_is_ready)
+    call = world.call(**SLOW)
+    world.until(lambda: any(phase_of(state) == 'slide' for state in world.states))
+    stopped = world.result(stop.call_async(Trigger.Request()))
+    assert (stopped.success, stopped.message) == (True, 'stopping; the finger is being lifted')
+    response = world.result(call).result
+    assert (response.error_code, response.lifted) == (Result.ERROR_STOPPED, True)
+    assert response.message == 'stopped on request'
+
+
 def cork(state, **values):
     known = {'label': 'cork', 'rejection': Rejection.NONE, 'confidence': 0.99, 'decided': True, 'windows': 5}
     return TextureEstimate(to_ns(state.header.stamp), state.exploration_id, **{**known, **values})
@@ -297,9 +309,10 @@ def test_the_diagnostics_count_what_happened(world):
 
     world.until(lambda: (numbers().get('done'), numbers().get('refused')) == ('1', '1'))
     assert numbers()['phase'] == 'idle'
+    assert 0.0 <= float(numbers()['arm_state_age_s']) < DEADLINE_S
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGHUP])
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGHUP, signal.SIGQUIT, signal.SIGTERM])
 def test_a_signal_that_ends_the_process_in_the_slide_lifts_the_finger_and_answers_first(graph, tmp_path, number):
     signal.signal(signal.SIGHUP, signal.SIG_DFL)  # under nohup it is ignored, and a node would inherit that
     pipe = str(tmp_path / 'finger')

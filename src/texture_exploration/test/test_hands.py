@@ -137,9 +137,11 @@ def test_an_error_in_the_program_lets_go_and_is_reported(bus, hand, monkeypatch)
     until(lambda: torque_is_off(bus))
 
 
-def test_a_process_that_is_killed_leaves_no_motor_under_torque(bus, parent):
+def test_a_process_that_is_killed_leaves_no_motor_under_torque_and_the_hand_to_the_next(bus, parent, hand):
     parent.send_signal(signal.SIGKILL)
     until(lambda: torque_is_off(bus))
+    hand.connect()
+    until(lambda: fault_of(hand) == '')
 
 
 def test_a_process_that_hangs_is_noticed_by_the_motors_and_the_force_runs_out(bus, parent):
@@ -309,7 +311,9 @@ def test_a_motor_with_a_latched_error_is_rebooted_by_a_recovery_and_one_that_kee
     monkeypatch.setattr('texture_exploration.arms.dynamixel.RESTART_S', 0.2)
     monkeypatch.setattr(bus.motors, 'reboot', lambda _motor: None)
     bus.motors.fail(1, OVERLOAD)
-    with pytest.raises(DeviceError, match=r'motor 1 .* reports overload'):
+    with pytest.raises(
+        DeviceError, match=r'motor 1 .* still reports overload after a reboot; .*, switch its power off'
+    ):
         Explorer(arm_on(bus), TouchParams(), SafetyLimits(), lambda state: None).recover()
 
 

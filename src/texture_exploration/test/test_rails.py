@@ -3,6 +3,8 @@
 """The rails through their serial line, on the emulated microcontroller."""
 
 import struct
+import subprocess
+import sys
 import time
 from contextlib import closing
 
@@ -25,6 +27,18 @@ pytestmark = pytest.mark.realtime
 
 DEADLINE_S = 20.0
 SLIDING = ArmCommand(tangential_m_s=(0.02, 0.01))
+
+PARENT = """
+import sys, time
+from texture_exploration.arms.arm import ArmCommand
+from texture_exploration.arms.rails import RailsArm, RailsParams
+
+arm = RailsArm(RailsParams(device=sys.argv[1]))
+arm.connect()
+while True:
+    arm.command(ArmCommand(tangential_m_s=(0.02, 0.01)))
+    time.sleep(0.02)
+"""
 
 
 def until(condition):
@@ -69,6 +83,20 @@ def test_an_overload_lifts_the_finger_and_is_a_fault_until_cleared(rails, arm):
     rails.firmware.surface_m = 0.0
     arm.connect()
     until(lambda: arm.state().fault == '')
+
+
+def test_a_process_that_is_killed_leaves_the_rails_at_rest_and_to_the_next(rails):
+    velocity = rails.firmware.velocity
+    with subprocess.Popen([sys.executable, '-c', PARENT, str(rails.port.link)]) as process:
+        try:
+            until(lambda: velocity[0] > 0.015)
+        finally:
+            process.kill()
+    until(lambda: not velocity.any())
+    assert rails.firmware.watchdog_stops == 1
+    with closing(RailsArm(RailsParams(device=str(rails.port.link)))) as arm:
+        arm.connect()
+        assert arm.state().fault == ''
 
 
 def test_an_exploration_on_the_rails_slides_as_in_the_paper(rails, arm):

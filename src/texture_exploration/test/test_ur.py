@@ -198,6 +198,7 @@ def test_it_touches_holds_2_newtons_slides_20_mm_at_20_mm_s_and_lifts(emulator, 
         assert exploration.ended.wait(DEADLINE_S)
         assert exploration.outcome.success, exploration.outcome.message
         end = explorer.arm.state()
+        assert explorer.arm.warning() == ''  # nothing was refused
     finally:
         explorer.close()
     begin_ns = min(stamp for stamp, phase in phases if phase is Phase.SLIDE)

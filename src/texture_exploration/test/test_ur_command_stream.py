@@ -3,6 +3,8 @@
 """What is sent to the UR controller, cycle by cycle, on a controller that is made up."""
 
 import importlib.util
+from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -10,9 +12,17 @@ import pytest
 from texture_core.errors import DeviceError
 from texture_core.types import ExplorationRequest
 from texture_exploration.arms import ur as ur_probe
+from texture_exploration.arms import ur_worker
 from texture_exploration.arms.arm import ArmCommand
 from texture_exploration.arms.ur import UrArm, UrArmParams, UrCommand, UrReport
-from texture_exploration.arms.ur_worker import STOP_DECELERATION_M_S2, UrCommandStream, Watchdog
+from texture_exploration.arms.ur_worker import (
+    SILENT_S,
+    STOP_DECELERATION_M_S2,
+    Observer,
+    UrCommandStream,
+    Watchdog,
+    Worker,
+)
 from texture_exploration.explorer import Explorer
 from texture_exploration.safety import SafetyLimits
 from texture_exploration.touch import TouchParams
@@ -93,7 +103,7 @@ class SteppedLink:
     def report(self):
         robot, stream = self.robot, self.stream
         measured = (tuple(vector[:3].tolist()) for vector in (robot.pose, robot.velocity, robot.force))
-        return UrReport(self.now_ns, *measured, 0.1, 1, True, stream.trusted)
+        return UrReport(self.now_ns, *measured, 0.1, 1, True, stream.trusted, stream.refused)
 
     def check(self):
         pass
@@ -224,6 +234,59 @@ def test_a_finger_that_turns_back_out_of_force_control_is_led_back_before_anythi
     assert sent[back] == ['speedL', -0.05, 0.0, 0.0, STOP_DECELERATION_M_S2]
     assert 'forceModeStop' not in names[:back]
     assert names[back + 1 :] == ['setWatchdog', 'forceModeStop', 'setWatchdog', 'speedL']
+
+
+@pytest.mark.parametrize(
+    ('command', 'refused'), [(None, 'speedStop'), (None, 'forceModeStop'), (RISING, 'forceModeStop')]
+)
+def test_an_end_of_force_control_that_the_controller_refuses_is_named_and_repeated(command, refused):
+    arm, answers = Arm(), []
+    arm.stream.trusted = True
+    arm.cycles(0.1, RISING._replace(force_n=1.0))
+    setattr(arm.control, refused, lambda *_: answers.append(len(answers) >= 2) or answers[-1])
+    arm.cycles(0.1, command)
+    assert answers == [False, False, True]
+    assert arm.stream.refused == refused
+    assert (arm.control.velocity_m_s > 0.0) == (command is RISING)
+
+
+def test_a_force_that_the_controller_refuses_and_a_command_it_refused_are_warned_of():
+    arm, link = Arm(), SteppedLink([])
+    arm.stream.trusted = True
+    arm.control.forceMode = lambda *_: False
+    arm.cycles(0.1, RISING._replace(force_n=1.0))
+    assert arm.stream.refused == 'forceMode'
+    link.arm.connect()
+    assert link.arm.warning() == ''
+    link.stream.refused = 'forceMode'
+    assert "refused 'forceMode', which is sent again until it is taken" in link.arm.warning()
+
+
+def test_a_controller_that_is_silent_gets_no_commands_until_it_is_heard_again(monkeypatch):
+    monkeypatch.setattr(ur_worker, 'set_alarm', lambda _seconds: None)
+    receive = Mock(**{f'getActualTCP{name}.return_value': [0.0] * 6 for name in ('Pose', 'Speed', 'Force')})
+    receive.configure_mock(**{'getSafetyMode.return_value': 1, 'getRuntimeState.return_value': 2})
+    observer, stream = Observer(receive, Mock(), PARAMS), Mock(trusted=False, refused='')
+    worker = SimpleNamespace(
+        _control=Mock(),
+        _observer=observer,
+        _commands=stream,
+        _watchdog=SimpleNamespace(moving_s=0.1),
+        _stopped=False,
+        _ur_command=RISING,
+        _measured_ns=0,
+    )
+
+    def sent(stamp_s):
+        receive.getTimestamp.return_value = stamp_s
+        stream.cycle.reset_mock()
+        observer._poll(0.02)
+        Worker._cycle(worker)
+        return stream.cycle.call_count
+
+    assert sum(sent(7.0) for _ in range(20)) == 1 + round(SILENT_S / 0.02)
+    worker._control.kickWatchdog.assert_not_called()  # it stops the arm meanwhile
+    assert sent(7.1) == 1
 
 
 # --------------------

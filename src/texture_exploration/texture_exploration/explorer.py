@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import threading
 import time
 from collections import Counter
@@ -96,6 +97,13 @@ class Explorer:
         self._end_motion('the explorer released the arm', NO_CONTROL)
         if not self.arm.keeps_start:
             self._home = None
+
+    def arm_age_s(self) -> float:
+        """Return the age of the newest state of the arm, s; NaN if it cannot be reached."""
+        try:
+            return (self.clock() - self.arm.state().time_ns) * 1e-9
+        except DeviceError:
+            return math.nan
 
     def fault(self) -> str:
         """Return in a sentence why the arm cannot move now, '' if it can."""

@@ -70,6 +70,7 @@ SILENT = 'does not answer'
 GARBLED = 'answers with data that cannot be read: do two motors have this id, or is the cable damaged?'
 RESET = 'has lost its torque: it was reset, for example by a voltage drop'
 REMEDY = '; when it has cooled and nothing blocks it, call `texture recover`, or switch its power off and on'
+AFTER_REBOOT = ' after a reboot; when it has cooled and nothing blocks it, switch its power off and on'
 HARDWARE_ERRORS = {0: 'input voltage', 2: 'overheating', 3: 'encoder', 4: 'electrical shock', 5: 'overload'}
 
 
@@ -130,8 +131,11 @@ class DynamixelBus:
             os.close(self.lock)
             self.lock = -1
 
-    def start(self) -> None:
-        """Find and check the motors, set mode and gains; only without an error let them hold their position."""
+    def start(self, *, rebooted: bool = False) -> None:
+        """Find and check the motors, set mode and gains; only without an error let them hold their position.
+
+        `rebooted` says that a reboot has not cleared an error that they report.
+        """
         self.torque_off(self._profile.ids)  # an earlier program may have left it on
         self.missing = set(self._profile.ids)
         found = [motor for motor in self._profile.ids if any(self._prepare(motor) for _ in range(TRIES))]
@@ -142,7 +146,9 @@ class DynamixelBus:
             )
         errors = {motor: bits for motor in found if (bits := self.read_register(motor, 'hardware_error'))}
         if errors:
-            raise DeviceError('; '.join(self._reported(motor, bits) for motor, bits in errors.items()))
+            raise DeviceError(
+                '; '.join(self._reported(motor, bits, rebooted=rebooted) for motor, bits in errors.items())
+            )
         for motor in found:
             # Its watchdog first: once its torque is on, it holds its position.
             if self._profile.watchdog:
@@ -303,8 +309,10 @@ class DynamixelBus:
             self.write(motor, 'goal_current', self._goal_currents[motor])
         return ''
 
-    def _reported(self, motor: int, bits: int) -> str:
+    def _reported(self, motor: int, bits: int, *, rebooted: bool = False) -> str:
         """Return the hardware error of a motor and the remedy as text."""
+        if rebooted:
+            return f'{self._profile.owner(motor)} still reports {_reasons(bits)}{AFTER_REBOOT}'
         return f'{self._profile.owner(motor)} reports {_reasons(bits)}{REMEDY}'
 
     def _counts(self, motor: int, current_a: float) -> int:
@@ -463,6 +471,7 @@ class DynamixelHand:
         self._state: HandState | None = None
         self._failure = NOT_CONNECTED
         self._doubt = ''
+        self._rebooted = False  # since the last connection
         self._highest_a: Mapping[int, float] = {}
         self._grip: Mapping[str, float] = {}
         self._commands: dict[str, tuple[ArmCommand, float]] = {}
@@ -522,6 +531,7 @@ class DynamixelHand:
         bus = DynamixelBus(self._device, self.profile)
         try:
             bus.reboot()
+            self._rebooted = True
         finally:
             bus.close()
 
@@ -550,7 +560,8 @@ class DynamixelHand:
             line = self._device, str(self.profile.baud), bus.torque_off_packet().hex()
             guard = GuardProcess(__name__, *line, holds=(bus.lock,))
             self._highest_a = bus.limits_a
-            bus.start()
+            bus.start(rebooted=self._rebooted)
+            self._rebooted = False
             self._doubt = self._doubtful(bus.deaf)
             self._control_loop(bus)
         except DeviceError as error:

@@ -60,7 +60,7 @@ class UrReport(NamedTuple):
 
     `time_ns` is when it arrived, of CLOCK_MONOTONIC. `force_n` is the force of the surroundings on the tool; `zeroed`
     says that its sensor was zeroed since the arm was connected. `watchdog_s` is how long the controller's
-    watchdog waits.
+    watchdog waits. `refused` is the command that the controller refused last, '' if none since the arm was connected.
     """
 
     time_ns: int
@@ -71,6 +71,7 @@ class UrReport(NamedTuple):
     safety_mode: int
     playing: bool
     zeroed: bool
+    refused: str = ''
 
 
 # --------------------
@@ -421,7 +422,13 @@ class UrArm(SurfaceArm):
             raise
 
     def warning(self) -> str:
-        """Return in a sentence that the controller is a CB3, which only estimates forces; '' if it is another."""
+        """Return in a sentence that a command was refused, or that a CB3 only estimates forces; '' if neither."""
+        report = self._link and self._link.report
+        if report and report.refused:
+            return (
+                f"the controller at {self._params.ip} refused '{report.refused}', which is sent again until it is "
+                'taken; look at its pendant, then call `texture deactivate` and `texture activate`'
+            )
         if self._series != CB3:
             return ''
         return (

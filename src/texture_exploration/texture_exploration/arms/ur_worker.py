@@ -119,6 +119,7 @@ class UrCommandStream:
 
     def __init__(self, control: Any, params: UrArmParams, watchdog: Watchdog) -> None:
         self.trusted = False
+        self.refused = ''  # the command that the controller refused last
         self._control = control
         self._params = params
         self._watchdog = watchdog
@@ -155,13 +156,27 @@ class UrCommandStream:
         else:
             self._speed(ur_command)
 
-    def stand_still(self) -> None:
-        """Stop at once, and return when the arm is at rest; commands that are acknowledged are not overwritten."""
+    def stand_still(self) -> bool:
+        """Stop at once, and return when the arm is at rest, or with False when the controller refused.
+
+        Commands that are acknowledged are not overwritten.
+        """
         with self._watchdog.patient():
-            self._watchdog.call(self._control.speedStop, STOP_DECELERATION_M_S2)
+            rests = self._taken('speedStop', self._watchdog.call(self._control.speedStop, STOP_DECELERATION_M_S2))
             if self._mode is Mode.FORCE:
-                self._watchdog.call(self._control.forceModeStop)
+                rests &= self._end_force()
+        if rests:
             self._mode = Mode.STANDSTILL
+        return rests
+
+    def _end_force(self) -> bool:
+        """End force control; return whether the controller did: otherwise the finger still presses."""
+        return self._taken('forceModeStop', self._watchdog.call(self._control.forceModeStop))
+
+    def _taken(self, name: str, taken: bool) -> bool:
+        if not taken:
+            self.refused = name
+        return taken
 
     def _change(self, mode: Mode, ur_command: UrCommand | None) -> bool:
         """Leave the present mode; return whether the new one has begun."""
@@ -174,11 +189,15 @@ class UrCommandStream:
             self._braking = True
             self._control.speedL([0.0] * 6, STOP_DECELERATION_M_S2, 1.0 / RATE_HZ)
             return False
+        # A mode that the controller refuses to leave is still there, and the next cycle tries again.
         if mode is Mode.STANDSTILL:
-            self.stand_still()
+            if not self.stand_still():
+                return False
         elif self._mode is Mode.FORCE:
             with self._watchdog.patient():
-                self._watchdog.call(self._control.forceModeStop)
+                ended = self._end_force()
+            if not ended:
+                return False
         # The watchdog guards every mode but standstill; at rest one that waits too long is set again.
         late = self._mode is Mode.STANDSTILL and self._watchdog.moving_s > 1.0 / self._params.watchdog_hz
         if mode is not Mode.STANDSTILL and (late or not self._watchdog.armed) and not self._watchdog.arm():
@@ -227,7 +246,7 @@ class UrCommandStream:
         wrench = [0.0, 0.0, -(ur_command.force_n or 0.0), 0.0, 0.0, 0.0]
         limits = [*(FORCE_DEVIATION_M,) * 2, FORCE_SPEED_M_S, *(FORCE_DEVIATION_RAD,) * 3]
         frame = list(self._params.surface_pose)
-        self._control.forceMode(frame, normal_only, wrench, FORCE_FRAME_FIXED, limits)
+        self._taken('forceMode', self._control.forceMode(frame, normal_only, wrench, FORCE_FRAME_FIXED, limits))
 
 
 # --------------------
@@ -251,8 +270,8 @@ LOST = 'the connection to the controller was lost; is it still on, and the cable
 class Observer:
     """Reports the measurements of the controller, in a separate thread: commands may take a while.
 
-    `newest` is the last report, None before the first; `idle` is set by each in which no program plays; `zeroed`
-    and `watchdog_s` come from the other thread.
+    `newest` is the last report, None before the first; `idle` is set by each in which no program plays; `zeroed`,
+    `refused` and `watchdog_s` come from the other thread.
 
     Silence counts only while this thread is awake, so that a stalled machine is not reported as a dead controller.
     """
@@ -260,6 +279,7 @@ class Observer:
     def __init__(self, receive: Any, channel: socket.socket, params: UrArmParams) -> None:
         self.connected = True
         self.silent = self.zeroed = self.idle = False
+        self.refused = ''
         self.watchdog_s = 1.0 / params.watchdog_hz
         self.newest: UrReport | None = None
         self._receive = receive
@@ -299,6 +319,7 @@ class Observer:
             safety_mode=receive.getSafetyMode(),
             playing=receive.getRuntimeState() == PROGRAM_PLAYING,
             zeroed=self.zeroed,
+            refused=self.refused,
         )
         self.newest = report
         self.idle |= not report.playing
@@ -366,7 +387,7 @@ class Worker:
         elif not self._observer.silent:
             commands.cycle(self._ur_command)
         # After the cycle and not at once: a force that is reported as zeroed is from after the zeroing.
-        self._observer.zeroed = commands.trusted
+        self._observer.zeroed, self._observer.refused = commands.trusted, commands.refused
         self._observer.watchdog_s = self._watchdog.moving_s
         self._control.waitPeriod(begin)
 
