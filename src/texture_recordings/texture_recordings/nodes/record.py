@@ -9,6 +9,7 @@ import threading
 import time
 from collections import Counter
 from dataclasses import dataclass
+from typing import Any
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -18,7 +19,7 @@ from texture_core.config import param
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.ros import DiagnosticReport, Diagnostics, declare, run
 from texture_core.types import Quality
-from texture_recordings.bags import COMMON, MESSAGES, BagWriter, RawMessage, typestore
+from texture_recordings.bags import COMMON, MESSAGES, BagWriter, Continuity, RawMessage, decode, typestore
 from texture_recordings.ros import TOPICS, message_class
 
 QUEUE = 20_000  # a minute of one finger: a disk that stalls longer loses messages, and they are counted
@@ -52,6 +53,7 @@ class RecordNode(Node):
         self._path, self._all = params.out, params.all
         self._bag = BagWriter(params.out)
         self._counts: Counter[str] = Counter()
+        self._continuity = Continuity()
         self._queue: queue.Queue[RawMessage | None] = queue.Queue(QUEUE)
         self._error: OSError | None = None
         self._writer = threading.Thread(target=self._write, name='writer')
@@ -120,12 +122,15 @@ class RecordNode(Node):
             try:
                 if message is not NOTHING:
                     self._bag.write_raw(message)
-                    self._counts['messages'] += 1
                 if time.monotonic() - flushed_s >= FLUSH_S:
                     flushed_s = time.monotonic()
                     self._bag.flush()
-            except OSError as error:  # noqa: PERF203 – a disk is slower
+            except OSError as error:
                 self._error = self._error or error
+                continue
+            if message is not NOTHING:
+                self._counts['messages'] += 1
+                self._count_losses(message)
 
     def _next(self) -> RawMessage | None:
         try:
@@ -133,14 +138,34 @@ class RecordNode(Node):
         except queue.Empty:
             return NOTHING
 
+    def _count_losses(self, message: RawMessage) -> None:
+        if not message.msgtype.endswith('/TactileSignal'):
+            return
+        try:
+            signal = decode(message.data, message.msgtype)
+        except InvalidData:
+            self._counts['bad'] += 1
+            return
+        self._continuity.update(message.topic, signal)
+
     def _check(self) -> None:
         if self._error is not None:
             raise InvalidData(f"'{self._path}' cannot be written: {self._error}; free some space and record again")
 
     def _report(self) -> DiagnosticReport:
-        messages, dropped = self._counts['messages'], self._counts['dropped']
-        sentence = f'{messages} messages recorded, {dropped or "none"} dropped'
-        return 'WARN' if dropped else 'OK', sentence, {'messages': messages, 'dropped_messages': dropped}
+        lost = sum(self._continuity.lost.values())
+        dropped, bad = self._counts['dropped'], self._counts['bad']
+        faults = {'lost_samples': lost, 'dropped_messages': dropped, 'bad_messages': bad}
+        numbers: dict[str, Any] = {
+            'messages': self._counts['messages'],
+            **faults,
+            'restarts': sum(self._continuity.restarts.values()),
+            **{f'samples {topic}': count for topic, count in self._continuity.samples.items()},
+        }
+        others = [f'{count} {name.replace("_", " ")}' for name, count in faults.items() if count]
+        said = ', '.join(filter(None, (self._continuity.losses, *others[bool(lost) :])))
+        sentence = f'{self._counts["messages"]} messages recorded, {said or "nothing lost"}'
+        return 'WARN' if said else 'OK', sentence, numbers
 
 
 def main() -> None:
