@@ -591,6 +591,8 @@ def _fields_of(value: Any, msgtype: str) -> dict[str, Any]:
             numbers = zip(value.name, getattr(value, kind), strict=False)
             found |= {f'{kind}.{joint}': number for joint, number in numbers}
     else:
+        if sum(axis.size > 1 for axis in getattr(getattr(value, 'layout', None), 'dim', ())) > 1:
+            raise InvalidData('its array has several dimensions; republish it flat, or use `SlideDataset.from_arrays`')
         _values(value, '', found)
     return found
 
