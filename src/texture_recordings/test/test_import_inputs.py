@@ -360,6 +360,13 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
     ),
     'a delimiter at the end of each row': (text('t,x\n' + lines(T, [f'{x:.6f},' for x in X])), {}, CORK),
     'a last row that was cut': (text(('t,x\n' + lines(T, [f'{x:.6f}' for x in X]))[:-4]), {}, [('cork', X[:-1])]),
+    'a last row that was cut and rows': (
+        text(('id,x\n' + lines(['a', 'b'] * (N // 2), X))[:-4]), {**RATE, 'rows': {'id': 'a'}}, [('cork', X[::2])],
+    ),
+    'many texts in two slides': (
+        csv(T, X, UNUSED['many texts'], np.repeat(['a', 'b'], N // 2), names='t,x,share,part'),
+        {'slides': {'by': 'column', 'column': 'part'}}, [('cork', X[: N // 2]), ('cork', X[N // 2 :])],
+    ),
     '#N/A in the first column': (
         csv(['#N/A' if np.isnan(x) else x for x in MISSING], Y, names='x,y'), RATE, [('cork', MISSING)],
     ),
