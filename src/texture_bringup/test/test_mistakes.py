@@ -137,3 +137,14 @@ def test_what_is_missing_or_mistyped_is_named(command, sentence, data, capsys, m
     monkeypatch.chdir(data)
     monkeypatch.delenv('TEXTURE_DATA', raising=False)
     assert sentence in refused(command.split(), capsys)
+
+
+def test_a_pattern_that_takes_the_number_of_a_file_for_a_label_is_named(tmp_path, capsys) -> None:
+    for name in ('cork_2025_1', 'cork_2026_1'):
+        np.savetxt(tmp_path / f'{name}.csv', np.ones((1000, 1)), header='acc', comments='')
+    (tmp_path / 'map.yaml').write_text(
+        "{files: '{material}_{run:d}.csv', label: {column: material}, slides: {by: file}, "
+        'streams: {signal: {columns: [acc], rate_hz: 1000, unit: g}}}'
+    )
+    assert main(['import', 'table', str(tmp_path / 'map.yaml'), str(tmp_path), '--dry-run']) == 0
+    assert 'surfaces that differ by a number alone: cork_2025, cork_2026' in capsys.readouterr().out

@@ -13,9 +13,10 @@ from sklearn.ensemble import ExtraTreesClassifier, RandomForestClassifier
 from texture_core.errors import InvalidParameter, MissingLibrary, ModelMismatch
 from texture_estimation.learners.learner import standardisation
 from texture_estimation.learners.sklearn_learner import SklearnPredictor, unpacked
-from texture_estimation.model import load_model
+from texture_estimation.model import AddedSlide, load_model
 from texture_estimation.recipe import Recipe
 from texture_estimation.training import train
+from texture_features.feature_set import LabelledFeatures
 
 INPUTS = {'signal': {'features': ['hjorth']}}
 TREES = {'estimator': 'sklearn.ensemble:ExtraTreesClassifier', 'n_estimators': 20}
@@ -134,3 +135,26 @@ def test_a_tree_that_points_outside_itself_or_back_is_refused_before_it_is_used(
     tree.__setstate__(state)
     with pytest.raises(ModelMismatch, match='points outside its nodes or features'):
         SklearnPredictor(forest, np.zeros(3), np.ones(3), 2, 1.0)
+
+
+def test_trees_keep_the_trained_textures_where_one_is_added():
+    rng = np.random.default_rng(0)
+    centres = 1.2 * rng.normal(size=(5, 8))
+
+    def slides(number, count):
+        return [centres[number] + 0.6 * rng.normal(size=8) + rng.normal(size=(12, 8)) for _ in range(count)]
+
+    trained = {f'texture{number}': slides(number, 12) for number in range(4)}
+    names = [f'{label}/{number}' for label, of in trained.items() for number in range(len(of))]
+    labels = np.repeat([name.partition('/')[0] for name in names], 12)
+    values = np.concatenate([slide for of in trained.values() for slide in of])
+    features = tuple(f'feature{number}' for number in range(8))
+    model = train(recipe_of(TREES), LabelledFeatures(values, labels, np.repeat(names, 12), features, 'a1', 0.5, 0.1))
+    added = model.with_added_slides((AddedSlide('silk', 'e1', slides(4, 1)[0]),))
+    tests = [(f'texture{number}', slide) for number in range(4) for slide in slides(number, 12)]
+    before, after = (
+        np.mean([one.labels[one.predict_log_proba(slide).sum(axis=0).argmax()] == label for label, slide in tests])
+        for one in (model, added)
+    )
+    assert before > 0.9
+    assert after > before - 0.05

@@ -481,7 +481,7 @@ class TextureModel(StoredModel):
             return scores, compared
         # Trained textures keep the ratios of their probabilities; what was added to one of them is a separate class.
         weights, offsets, codes = self._added
-        by_class = log_softmax(np.concatenate([compared, scores], axis=-1) @ weights + offsets)
+        by_class = log_softmax(compared @ weights + offsets)
         log_proba, n = np.full((*scores.shape[:-1], len(self.labels)), -np.inf), self.n_trained
         log_proba[..., :n] = log_softmax(scores) + np.logaddexp.reduce(by_class[..., :n], axis=-1, keepdims=True)
         log_proba[..., codes] = np.logaddexp(log_proba[..., codes], by_class[..., n:])
@@ -505,11 +505,9 @@ class TextureModel(StoredModel):
         codes = [self.labels.index(slide.label) for slide in self.added_slides for _ in slide.values]
         added, classes = np.unique(codes, return_inverse=True)
         windows = np.concatenate([self.examples.values, *(slide.values for slide in self.added_slides)])
-        scores, compared = self._predict_trained(windows)
         y = np.concatenate([self.examples.codes, self.n_trained + classes])
-        weights, offsets = linear_discriminant(
-            np.concatenate([compared, scores], axis=1), y, self.n_trained + len(added), SHRINKAGE
-        )
+        # Scores are no input: on its own training windows a learner that overfits gives others than on new ones.
+        weights, offsets = linear_discriminant(self.compared(windows), y, self.n_trained + len(added), SHRINKAGE)
         return INVERSE_TEMPERATURE * weights, INVERSE_TEMPERATURE * offsets, added
 
     def predict_log_proba(self, X: Array) -> Array:

@@ -199,3 +199,37 @@ def test_wrong_sources_names_and_numbers_are_refused_with_a_sentence(tmp_path: P
     (source / 'slides.npz').write_bytes(b'nothing')
     with pytest.raises(InvalidData, match='not a file of this data set'):
         import_ntp21(source, tmp_path / 'out')
+
+
+def changed(folder: Path, file: str, **arrays: np.ndarray) -> Path:
+    """Replace arrays of a file."""
+    with np.load(folder / file) as content:
+        np.savez(folder / file, **{**content, **arrays})
+    return folder
+
+
+WRONG_SOUND = {
+    'text': np.full(100, 'a'), 'complex': np.full(100, 1j), 'NaN': np.full(100, np.nan), 'none': np.empty(0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('name', WRONG_SOUND)
+def test_arrays_that_are_no_finite_samples_are_refused_with_a_sentence(tmp_path: Path, name: str) -> None:
+    source = changed(make_lmt29(tmp_path / 'in'), 'recordings.npz', **{'G4Bamboo/01': WRONG_SOUND[name]})
+    with pytest.raises(InvalidData, match=r'not a file of this data set: .*; fetch it again'):
+        import_lmt29(source, tmp_path / 'out')
+
+
+def test_sound_in_one_column_is_read_and_other_keys_and_wrong_times_are_refused(tmp_path: Path) -> None:
+    sound = changed(make_lmt29(tmp_path / 'sound'), 'recordings.npz', **{'G4Bamboo/01': np.full((100, 1), 7.0)})
+    (bag,) = import_lmt29(sound, tmp_path / 'out', slides='1', materials=['G4Bamboo'])
+    assert SlideDataset.from_bags([bag]).samples('signal')[0].samples.shape == (100, 1)
+    late = np.arange(300.0)[:, None] / 320.0 * np.ones(11)
+    late[-1, 10] = 1e11
+    for key, values, sentence in (
+        ('felt/v20/f1', late, "holds 'felt/v20/f1', which is not of this data set"),
+        ('texture07/speed020/force0.0', late, r'300 samples lasted 1e\+11 s'),
+    ):
+        source = changed(make_ntp21(tmp_path / key.replace('/', '_')), 'slides.npz', **{key: values})
+        with pytest.raises(InvalidData, match=sentence):
+            import_ntp21(source, tmp_path / 'none')

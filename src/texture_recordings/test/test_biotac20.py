@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from texture_core.errors import InvalidData
 from texture_core.types import NANOSECONDS, Phase, TactileSignal, lost_samples
 from texture_recordings.bags import read_bag
 from texture_recordings.dataset import SlideDataset
@@ -117,3 +118,40 @@ def test_the_sign_follows_the_rule_sample_by_sample() -> None:
         negative = line < 0 or (line == 0 and expected[k - 1] < 0)
         expected[k] = -rectified[k] if negative else rectified[k]
     np.testing.assert_array_equal(restore_sign(rectified), expected)
+
+
+def test_slides_have_the_number_in_their_name(tmp_path: Path) -> None:
+    source = make_source(tmp_path / 'in')
+    with np.load(source / 'material07.npz') as file:
+        content = {name.replace('slide02', 'slide05'): values for name, values in file.items()}
+    np.savez(source / 'material07.npz', **content)
+    (bag,) = import_biotac20(source, tmp_path / 'out', slides='5')
+    assert [slide.exploration_id for slide in find_slides([bag])] == ['material07/slide05']
+    with pytest.raises(InvalidData, match='none of the requested slides; it has 1 to 5'):
+        import_biotac20(source, tmp_path / 'none', slides='2')
+
+
+WRONG_ARRAYS = {
+    'time NaN': ('frame_time', np.full(N_FRAMES, np.nan)),
+    'time far': ('frame_time', np.linspace(0.0, 1e7, N_FRAMES)),
+    'text': ('frames', np.full((N_FRAMES, 44), 'a')),
+    'no frames': ('frames', np.empty((0, 44), np.int16)),
+    'fewer frames': ('frames', np.zeros((N_FRAMES - 20, 44), np.int16)),
+    'text as velocity': ('velocity', np.full((N_FRAMES, 4), 'a')),
+}
+
+
+@pytest.mark.parametrize('name', WRONG_ARRAYS)
+def test_arrays_that_are_no_slide_are_refused_with_a_sentence(tmp_path: Path, name: str) -> None:
+    source, (array, values) = make_source(tmp_path / 'in'), WRONG_ARRAYS[name]
+    with np.load(source / 'material07.npz') as file:
+        np.savez(source / 'material07.npz', **{**file, f'slide01/{array}': values})
+    with pytest.raises(InvalidData, match=r'not a file of this data set: .*; fetch it again'):
+        import_biotac20(source, tmp_path / 'out')
+
+
+def test_a_file_without_a_slide_is_refused(tmp_path: Path) -> None:
+    (tmp_path / 'in').mkdir()
+    np.savez(tmp_path / 'in' / 'material07.npz', felt=np.zeros(3))
+    with pytest.raises(InvalidData, match='hold no slide; fetch them again'):
+        import_biotac20(tmp_path / 'in', tmp_path / 'out')

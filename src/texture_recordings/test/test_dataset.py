@@ -8,7 +8,7 @@ import pytest
 
 from texture_core.errors import InvalidData
 from texture_core.types import NANOSECONDS, ExplorationState, Phase, TactileSignal
-from texture_recordings.bags import BagWriter
+from texture_recordings.bags import BagWriter, Continuity
 from texture_recordings.nodes.replay import Schedule
 from texture_recordings.slides import STREAMS, LabelledSlide, find_slides, parse_selection, with_places
 
@@ -86,6 +86,14 @@ def test_messages_are_due_at_their_distances_divided_by_the_rate() -> None:
 def test_long_pauses_are_shortened() -> None:
     schedule = Schedule(rate=1.0)
     assert [schedule.due_s(NANOSECONDS * t) for t in (0, 60, 60)] == pytest.approx([0.0, 1.0, 1.0])
+
+
+def test_losses_and_restarts_of_each_stream_are_counted() -> None:
+    continuity = Continuity()
+    for stream, first in (('a', 100), ('b', 0), ('a', 104), ('a', 110), ('a', 0), ('b', 4)):
+        continuity.update(stream, TactileSignal(0, 's', ('c',), (), 1.0, first, np.zeros((4, 1), dtype=np.float32)))
+    assert (continuity.lost['a'], continuity.restarts['a'], continuity.samples['a']) == (2, 1, 16)
+    assert (continuity.lost['b'], continuity.restarts['b'], continuity.samples['b']) == (0, 0, 8)
 
 
 def test_slides_that_touched_at_several_places_of_a_surface_know_theirs():

@@ -360,6 +360,13 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
     ),
     'a delimiter at the end of each row': (text('t,x\n' + lines(T, [f'{x:.6f},' for x in X])), {}, CORK),
     'a last row that was cut': (text(('t,x\n' + lines(T, [f'{x:.6f}' for x in X]))[:-4]), {}, [('cork', X[:-1])]),
+    'a last row that was cut and rows': (
+        text(('id,x\n' + lines(['a', 'b'] * (N // 2), X))[:-4]), {**RATE, 'rows': {'id': 'a'}}, [('cork', X[::2])],
+    ),
+    'many texts in two slides': (
+        csv(T, X, UNUSED['many texts'], np.repeat(['a', 'b'], N // 2), names='t,x,share,part'),
+        {'slides': {'by': 'column', 'column': 'part'}}, [('cork', X[: N // 2]), ('cork', X[N // 2 :])],
+    ),
     '#N/A in the first column': (
         csv(['#N/A' if np.isnan(x) else x for x in MISSING], Y, names='x,y'), RATE, [('cork', MISSING)],
     ),
@@ -535,12 +542,24 @@ def sound(folder: Path) -> None:
         writer.write(connection, START_NS, store.serialize_cdr(store.types[kind](data=np.zeros(400, np.uint8)), kind))
 
 
+def table(folder: Path) -> None:
+    kind, types = 'std_msgs/msg/Float32MultiArray', STORE.types
+    axes = [types['std_msgs/msg/MultiArrayDimension'](label=name, size=size, stride=size)
+            for name, size in (('samples', 10), ('channels', 2))]  # fmt: skip
+    layout = types['std_msgs/msg/MultiArrayLayout'](dim=axes, data_offset=0)
+    with Writer(folder / 'a_1', version=8, storage_plugin=StoragePlugin.MCAP) as writer:
+        connection = writer.add_connection('/p', kind, typestore=STORE)
+        value = types[kind](layout=layout, data=np.zeros(20, np.float32))
+        writer.write(connection, START_NS, STORE.serialize_cdr(value, kind))
+
+
 BAGS: dict[str, tuple[Write, Truth]] = {
     'a bag of ROS 1': (text('#ROSBAG V2.0', 'a_1.bag'), 'is a bag of ROS 1; convert it: rosbags-convert'),
     'a clock one hour ahead': (bag(3600.0), HALVES),
     'a clock that began at the start': (bag(-1.7e9 + 100.0), HALVES),
     'sensors of two frames': (bag(frames=2), r"frame_id': it changes .*rows: \{/p/header.frame_id: 'a'\}"),
     'sound': (sound, 'is sound whose messages do not tell the format; give a WAV file'),
+    'an array of two dimensions': (table, "message 0 of '/p' cannot be read: its array has several dimensions"),
     'a clock that is faster': (bag(3600.0, 0.5), r"topic '/p': the stamps differ .* and that changes by 2\.\d+ s"),
     'empty metadata': (both(bag(), emptied), HALVES),
     'several files without metadata': (

@@ -34,7 +34,7 @@ def write(path: Path, lost: int = 0) -> Path:
                 stamp_ns, f'slide{count // 100}', 'linear_slide', Phase.SLIDE, 0.01, surface='cork'
             )
             samples = np.full((10, 1), count, dtype=np.float32)
-            first = 10 * count + lost * (count > 150)
+            first = 10 * count + (lost if count > 150 else 0)
             bag.write('exploration', state, stamp_ns)
             bag.write(
                 'signal', TactileSignal(stamp_ns, 's', ('a',), (), 1000.0, first, samples), stamp_ns + STEP_NS - 1
@@ -61,7 +61,7 @@ def test_what_is_replayed_is_recorded_whole_and_in_order(tmp_path: Path) -> None
             assert replay.wait(60.0) == 0, replay.output
         assert record.stop(signal.SIGTERM) == 0, record.output
     assert 'published 200 exploration, 200 signal' in replay.output
-    assert ' messages recorded, none dropped, 5 samples lost' in record.output
+    assert '5 samples lost' in record.output
     for topic in ('signal', 'exploration'):
         sent = [value for _, _, value in read_bag(source, (topic,))]
         got = [value for _, _, value in read_bag(tmp_path / 'copy', (topic,))]

@@ -152,6 +152,13 @@ def test_a_mapping_that_makes_no_sense_is_refused_with_a_sentence(content: objec
         mapping_from(content)
 
 
+def test_a_column_whose_name_is_a_long_number_is_refused_with_a_sentence(tmp_path: Path) -> None:
+    save(tmp_path, x=np.arange(300.0))
+    mapping = mapping_from({'streams': {'signal': {'columns': [f'1-{"9" * 30_000}']}}, 'label': {'value': 'cork'}})
+    with pytest.raises(InvalidData, match=r"no column '1-9+"):
+        import_tables(mapping, tmp_path / 'in', tmp_path / 'out')
+
+
 def test_a_column_in_braces_and_whole_numbers_are_names() -> None:
     mapping = mapping_from({'streams': {'signal': {'columns': [0, 1, '3-5']}}, 'label': {'value': 7}})
     assert mapping.streams['signal'].columns == ['0', '1', '3-5']

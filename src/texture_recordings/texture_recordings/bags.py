@@ -88,6 +88,14 @@ END = b'\x02' + (20).to_bytes(8, 'little') + bytes(20) + MAGIC
 FOOTER_BYTES, CHECKSUM_FROM_END = len(END), 12
 
 
+def _check_unpacked(unpacked: int, size: int) -> None:
+    most = max(MAX_UNPACKED_BYTES, MAX_RATIO * size)
+    if unpacked > most:
+        raise FileRefused(
+            f'it unpacks from {size / MB:.3g} MB to more than the {most / MB:.0f} MB that are allowed; cut or split it'
+        )
+
+
 # rosbags unpacks whatever comes; here it stops at what a chunk declares.
 storage_mcap.DECOMPRESSORS['zstd'] = lambda data, size: zstd.ZstdDecompressor().decompress(data, size + 1)
 storage_mcap.DECOMPRESSORS['lz4'] = lambda data, size: lz4.frame.LZ4FrameDecompressor().decompress(data, size + 1)
@@ -164,11 +172,7 @@ def _end_of_chunks(file: BinaryIO) -> int:
             break
         if kind == CHUNK:
             unpacked += int.from_bytes(file.read(CHUNK_HEAD.size)[16:24], 'little')
-            if unpacked > (most := max(MAX_UNPACKED_BYTES, MAX_RATIO * size)):
-                raise FileRefused(
-                    f'it unpacks from {size / MB:.3g} MB to more than the {most / MB:.0f} MB that are allowed; cut or '
-                    'split it'
-                )
+            _check_unpacked(unpacked, size)
             chunks.append((at - length, length))
         end = at
     while chunks and not _is_whole(file, *chunks[-1]):
@@ -470,6 +474,35 @@ def _files(path: Path) -> list[Path]:
         raise FileRefused(f'it is compressed by {mode}, and storage alone is read so; unpack it by ros2 bag convert')
     # As rosbags finds them: next to the metadata, whatever folder the entry names.
     return [path / Path(str(name)).name for name in facts['relative_file_paths']]
+
+
+# --------------------
+# Whether streams of samples arrive without gaps.
+
+
+class Continuity:
+    """Count lost samples and restarts of streams, from the running index of their batches."""
+
+    def __init__(self) -> None:
+        self.samples: Counter[str] = Counter()
+        self.lost: Counter[str] = Counter()
+        self.restarts: Counter[str] = Counter()
+        self._next: dict[str, int] = {}
+
+    @property
+    def losses(self) -> str:
+        """What was lost, in words, '' if nothing; losses in a restart, which numbers from 0, are unknown."""
+        lost, restarts = self.lost.total(), self.restarts.total()
+        unknown = f'unknown losses in {restarts} restart{"s" if restarts > 1 else ""} of a driver or bridge'
+        return ', and '.join(filter(None, (f'{lost} samples lost' if lost else '', unknown if restarts else '')))
+
+    def update(self, stream: str, signal: TactileSignal) -> None:
+        """Take the next batch of a stream; an index that goes back is a restart of its driver, not a loss."""
+        jump = signal.first_sample - self._next.get(stream, signal.first_sample)
+        self.samples[stream] += len(signal.samples)
+        self.lost[stream] += max(0, jump)
+        self.restarts[stream] += jump < 0
+        self._next[stream] = signal.next_sample
 
 
 # --------------------

@@ -39,6 +39,8 @@ class PublicSet:
     order: Callable[..., tuple[str, tuple[Any, ...]]]  # groups of the key → surface, and what its slides are sorted by
     slide: Callable[[str, tuple[Any, ...], Arrays, str], Recording]  # of a surface, that order, and the array in a file
     dated: bool = False  # a bag for each first member of the order, not for each surface
+    number: Callable[[tuple[Any, ...]], int] | None = None  # of a slide by its order; None if by its rank
+    others: str = ''  # pattern of the names of the other arrays
 
     def __call__(
         self, source: str | Path, out: str | Path, slides: str = '', materials: Sequence[str] = ()
@@ -51,45 +53,65 @@ class PublicSet:
         with ExitStack() as opened:
             contents: dict[Path, Arrays] = {}
             for file in files:
-                with _reading(file):
+                with _reading(file, OSError):
                     contents[file] = Arrays(opened.enter_context(open_regular(file)))
                 for key in contents[file].names:
                     if match := re.fullmatch(self.key, f'{file.stem}/{key}'):
                         surface, order = self.order(*match.groups())
                         found[surface].append((order, file, key))
-            chosen = _chosen(found, slides, materials)
+                    elif not re.fullmatch(self.others, key):
+                        raise InvalidData(f"'{file}' holds '{key}', which is not of this data set; fetch it again")
+            if not found:
+                raise InvalidData(f"the files {self.files} in '{source}' hold no slide; fetch them again")
+            chosen = _chosen(found, slides, materials, self.number)
             if self.dated:
                 chosen.sort(key=lambda slide: str(slide[1][0]))
             bags = opened.enter_context(SlideBags(out))
             for surface, order, file, key in progress(chosen, 'import slides', len(chosen)):
-                with _reading(file):
+                with _reading(file, OSError):
                     recording = self.slide(surface, order, contents[file], key)
-                bags.write(order[0] if self.dated else surface, *recording)
+                with _reading(file):
+                    bags.write(order[0] if self.dated else surface, *recording)
         return bags.paths
 
 
-def _chosen(found: Mapping[str, Sequence[Any]], slides: str, surfaces: Sequence[str]) -> list[Any]:
-    """Return the wanted slides, each behind its surface, numbered separately for each surface in their order."""
+def _chosen(
+    found: Mapping[str, Sequence[Any]],
+    slides: str,
+    surfaces: Sequence[str],
+    number_of: Callable[[tuple[Any, ...]], int] | None,
+) -> list[Any]:
+    """Return the wanted slides, each behind its surface, numbered separately for each surface."""
     for name in surfaces:
         if name not in found:
             raise unknown_name(name, found, 'surface')
     wanted, chosen = parse_selection(slides), []
     for surface in surfaces or sorted(found):
-        numbered = enumerate(sorted(found[surface]), 1)
+        ordered = sorted(found[surface])
+        numbered = [(number_of(slide[0]) if number_of else rank, slide) for rank, slide in enumerate(ordered, 1)]
         of_surface = [(surface, *slide) for number, slide in numbered if wanted is None or number in wanted]
         if not of_surface:
-            raise InvalidData(f"'{surface}' has none of the requested slides; it has 1 to {len(found[surface])}")
+            first, last = numbered[0][0], numbered[-1][0]
+            raise InvalidData(f"'{surface}' has none of the requested slides; it has {first} to {last}")
         chosen += of_surface
     return chosen
 
 
 @contextmanager
-def _reading(file: Path) -> Iterator[None]:
+def _reading(file: Path, *more: type[Exception]) -> Iterator[None]:
     """Refuse a file whose content is not as that of its data set."""
+    refused: tuple[type[Exception], ...] = (ValueError, LookupError, ArithmeticError, TypeError, MemoryError, *more)
     try:
         yield
-    except (OSError, ValueError, LookupError, ArithmeticError) as error:
+    except refused as error:
         raise InvalidData(f"'{file}' is not a file of this data set: {error}; fetch it again") from error
+
+
+def _checked(name: str, values: AnyArray, *, nan: bool = False) -> AnyArray:
+    """Return values, (n, n_columns), if they are two finite rows or more, or any with `nan`; ValueError otherwise."""
+    if values.dtype.kind not in 'iuf' or not (nan or (len(values) > 1 and np.isfinite(values).all())):
+        raise ValueError(f"'{name}' has shape {values.shape}, type {values.dtype}; rows of finite numbers are needed")
+    return values.reshape(len(values), -1)
 
 
 def _signal(sensor: str, channels: tuple[str, ...], unit: str, rate_hz: float, samples: AnyArray) -> TactileSignal:
@@ -113,18 +135,23 @@ STATIC_CHANNELS = ('tdc', 'tac', 'pdc', *(f'electrode{i}' for i in range(1, 20))
 STATIC_COLUMNS = (0, 1, 2, *range(25, 44))
 BIOTAC_BATCH_S = 0.02
 STATE_BATCHES = 5  # a state every 0.1 s
+LONGEST_S = 1000.0  # of one slide; frames that are missing are counted, however many
 LOST_AFTER_S = 0.025  # frame times jitter by up to 8 ms; a larger step is a loss
 
 
 def _biotac20_slide(surface: str, order: tuple[Any, ...], arrays: Arrays, _key: str) -> Recording:
     """Return a slide with a state every 0.1 s, whose speed (m/s) and force (N) were measured next to it."""
     slide = order[0]
-    frames, frame_time = (arrays[f'{slide}/{name}'][:SLIDE_FRAMES] for name in ('frames', 'frame_time'))
-    places, frame_hz = frame_indices(frame_time), NANOSECONDS / FRAME_NS
+    frames, frame_time = (
+        _checked(name, arrays[name])[:SLIDE_FRAMES] for name in (f'{slide}/frames', f'{slide}/frame_time')
+    )
+    if frame_time.shape != (len(frames), 1) or np.ptp(frame_time) > LONGEST_S:
+        raise ValueError(f"'{slide}' does not have a time for each of its frames, within {LONGEST_S:g} s")
+    places, frame_hz = frame_indices(frame_time[:, 0]), NANOSECONDS / FRAME_NS
     vibration, fast_places = restore_sign(frames[:, PAC_COLUMNS].ravel())[:, None], np.arange(PAC_PER_FRAME)
     fast = _signal('biotac/pac', ('pac',), 'count', PAC_PER_FRAME * frame_hz, vibration)
     slow = _signal('biotac/slow', STATIC_CHANNELS, 'count', frame_hz, frames[:, STATIC_COLUMNS])
-    measured = (arrays[f'{slide}/{name}'] for name in ('velocity', 'wrench'))
+    measured = (_checked(name, arrays[f'{slide}/{name}'], nan=True) for name in ('velocity', 'wrench'))
     velocity, wrench = (rows[np.isfinite(rows).all(axis=1)] for rows in measured)  # behind the time, s
     x, y = velocity[:, 1:3].mean(axis=0) if len(velocity) else (math.nan, math.nan)
     named = ExplorationState(
@@ -190,7 +217,7 @@ def _steady(
     """Return the function for `PublicSet.slide` that reads a slide of such a set."""
 
     def slide(surface: str, order: tuple[Any, ...], arrays: Arrays, key: str) -> Recording:
-        samples, speed_m_s, force_n, direction_rad, steady = read(order, arrays[key])
+        samples, speed_m_s, force_n, direction_rad, steady = read(order, _checked(key, arrays[key]))
         whole = signal(samples)
         steady = steady or range(len(samples))
         named = ExplorationState(
@@ -257,6 +284,7 @@ def _fabricslide_slide(order: tuple[Any, ...], recorded: AnyArray) -> SteadySlid
 NTP21_TAXELS = 9
 TIME = 10  # column of the time, s; the one between is auxiliary and of unknown meaning: left out
 RATE_HZ = 320.0
+SLOWEST = 10.0  # times the nominal duration; a time stamp that is wrong would need any number of samples
 
 
 def _ntp21_slide(order: tuple[Any, ...], recorded: AnyArray) -> SteadySlide:
@@ -269,6 +297,8 @@ def evenly(samples: Array, duration_s: float) -> Array:
     """Return samples, evenly spaced over a duration, at 320 Hz, (n, n_channels)."""
     from scipy.interpolate import CubicSpline  # noqa: PLC0415 – nothing else in this package needs scipy
 
+    if not 0 < duration_s <= SLOWEST * len(samples) / RATE_HZ:
+        raise ValueError(f'{len(samples)} samples lasted {duration_s:g} s, at {RATE_HZ:g} Hz')
     sample_times = np.linspace(0.0, duration_s, len(samples))
     grid = np.arange(int(duration_s * RATE_HZ) + 1) / RATE_HZ
     values: Array = CubicSpline(sample_times, samples, axis=0)(grid)
@@ -302,6 +332,7 @@ def _fingersense_slide(order: tuple[Any, ...], recorded: AnyArray) -> SteadySlid
 import_biotac20 = PublicSet(
     'material*.npz', r'(material\d+)/(slide\d+)/frames',
     order=lambda material, slide: (material, (slide,)), slide=_biotac20_slide,
+    number=lambda order: int(order[0].removeprefix('slide')), others=r'.*',
 )  # fmt: skip
 IMPORTS: Mapping[str, PublicSet] = {
     'biotac20': import_biotac20,
@@ -330,7 +361,7 @@ IMPORTS: Mapping[str, PublicSet] = {
         order=lambda texture, number: (texture, (int(number),)),
         slide=_steady(
             'signal', partial(_signal, 'lmt/microphone', ('sound',), 'count', 22_050.0),
-            lambda _, recorded: (recorded[:, None], math.nan, math.nan, math.nan, None), motion='',
+            lambda _, recorded: (recorded[:, :1], math.nan, math.nan, math.nan, None), motion='',
         ),
     ),
 }  # fmt: skip

@@ -15,7 +15,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from itertools import chain
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
@@ -27,12 +27,13 @@ from texture_core.types import MAX_HZ, NANOSECONDS, AnyArray, Array
 from texture_recordings.bags import is_bag, message_types, read_foreign
 from texture_recordings.mapping import FileFormat, TableMapping, template_fields
 
-MAX_FILE_BYTES, MAX_TEXT_BYTES = 1000 * MB, 200 * MB
+MAX_FILE_BYTES = 1000 * MB
 MAX_VALUES = 8_000_000  # of 8 bytes, of one file; a larger file may have as many as it has bytes
 EXAMPLES = 3
 RANGE = re.compile(r'(\D*)(\d{1,9})-(?:\1)?(\d{1,9})')
 MAX_RANGE = 10_000
 TRIAL = 'trial'  # number of the first axis of arrays (n_trials, n_samples, n_channels)
+MAX_ARRAYS = 50_000  # data sets of an HDF5 file
 MAX_CHANNELS = 10_000  # more are samples: the array lies on its side
 MAX_TEXT = 200  # characters of a cell that is shown or a label
 
@@ -86,7 +87,7 @@ def chosen(wanted: Sequence[str], names: Sequence[str]) -> list[str]:
         meant = [name]
         if name not in names and match and 0 <= int(match[3]) - int(match[2]) < MAX_RANGE:
             meant = [f'{match[1]}{number}' for number in range(int(match[2]), int(match[3]) + 1)]
-        elif name not in names:
+        elif name not in names and len(name) <= 100:
             meant = [one for one in names if one and fnmatch.fnmatchcase(one, name)] or [name]
         if unknown := [one for one in meant if one not in names]:
             raise unknown_name(unknown[0], names, 'column')
@@ -140,6 +141,7 @@ def frames(path: Path, place: str, mapping: TableMapping) -> Iterator[TableFrame
 # ---- text files
 
 DELIMITERS = (',', ';', '\t', '|', ' ')
+BLOCK_ROWS = 20_000  # which are parsed at once
 NO_TEXT = frozenset(('nan', 'na', 'n/a', '#n/a', 'null'))  # 'none' may be a label
 BLANK = frozenset(('', 'nan', 'na', 'null', 'none'))
 NO_WORD = NO_TEXT | BLANK | {'inf', '-inf', '+inf'}
@@ -154,62 +156,68 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
     A row is malformed if it has other cells than the first one, or a text in a column whose numbers the mapping uses.
     A word in another column of numbers is refused, as rows of units and means have one.
     """
-    form, lines = mapping.format, list[tuple[int, str]]()
-    with open_regular(path, MAX_TEXT_BYTES) as opened:
+    form, parts = mapping.format, list[dict[str, AnyArray]]()
+    lines, junk, reasons = list[AnyArray](), list[AnyArray](), list[str]()
+    with open_regular(path) as opened:
         # The names of the columns, and those that the mapping wants as numbers.
         rest = _lines(opened, form)
         first = next(rest, (0, ''))
+        rest = rest if form.header else chain([first], rest)
         delimiter = form.delimiter or next((one for one in DELIMITERS if one in first[1]), ',')
         names = _names(_cells(first[1], delimiter), form)
         numbers = {name for one in mapping.streams.values() for name in chosen(one.columns, names)}
         numbers |= {*mapping.numbers()}
-        for line in rest if form.header else chain([first], rest):
-            take(len(names) + len(mapping.texts()))
-            lines.append(line)
-    if not lines:
+        numeric: dict[str, bool] = {}
+        # Block by block: the cells, what they are, and the rows that are malformed.
+        for block in iter(lambda: list(islice(rest, BLOCK_ROWS)), []):
+            take(len(block) * (len(names) + len(mapping.texts())))
+            rows = [_cells(line, delimiter) for _, line in block]
+            rows = [row[:-1] if len(row) == len(names) + 1 and not row[-1] else row for row in rows]
+            bad = {row: f"column 'all': {len(cells)} cells, {len(names)} are needed"
+                   for row, cells in enumerate(rows) if len(cells) != len(names)}  # fmt: skip
+            if not block[-1][1].endswith('\n'):
+                bad.setdefault(len(rows) - 1, "column 'all': the line has no end, so it may have been cut off")
+            whole = [[''] * len(names) if row in bad else cells for row, cells in enumerate(rows)]
+            part: dict[str, AnyArray] = {}
+            words: dict[int, str] = {}  # in unused columns of numbers
+            for name, cells in zip(names, zip(*whole, strict=True), strict=True):
+                text = name in mapping.texts()
+                if not text or name in numbers:
+                    points = [_with_point(cell) for cell in cells] if form.decimal == ',' else cells
+                    values = np.array([number_of(cell) for cell in points])
+                    text |= not numeric.setdefault(name, name in numbers or np.isfinite(values).mean() > NUMERIC)
+                for row in np.flatnonzero(np.isnan(values)).tolist() if numeric.get(name) else ():
+                    if name in numbers and cells[row].lower() not in BLANK:
+                        bad.setdefault(row, _reason(name, cells[row], form))
+                    elif row not in bad and WORD.search(cells[row]) and cells[row].lower() not in NO_WORD:
+                        words[row] = name
+                if not text:
+                    _refuse_commas(name, cells, form, delimiter)
+                part[name] = _texts(cells) if text else values
+            for row in bad:
+                if {*rows[row]} & {*names}:
+                    raise InvalidData(
+                        f'row {block[row][0]}: the names of the columns come again, {", ".join(rows[row][:5])}, so '
+                        'another recording may begin there; split the file there'
+                    )
+            if unlike := sorted(words.keys() - bad.keys()):
+                name = words[unlike[0]]
+                raise InvalidData(
+                    f"row {block[unlike[0]][0]}, column '{name}': a word in a column of numbers that no key uses: the "
+                    f"row may be one of units or means; remove it, or read texts there by rows: {{{name!r}: '*'}}"
+                )
+            reasons += [f'row {block[row][0]}, {bad[row]}' for row in sorted(bad)[: EXAMPLES - len(reasons)]]
+            lines.append(np.array([number for number, _ in block]))
+            junk.append(np.isin(np.arange(len(rows)), list(bad)))
+            parts.append(part)
+    if not parts:
         raise InvalidData('it has no rows below the names of its columns; choose files with samples')
-    # The cells, and the rows that are malformed.
-    rows = [_cells(line, delimiter) for _, line in lines]
-    rows = [row[:-1] if len(row) == len(names) + 1 and not row[-1] else row for row in rows]
-    bad = {row: f"column 'all': {len(cells)} cells, {len(names)} are needed"
-           for row, cells in enumerate(rows) if len(cells) != len(names)}  # fmt: skip
-    if not lines[-1][1].endswith('\n'):
-        bad.setdefault(len(rows) - 1, "column 'all': the line has no end, so it may have been cut off")
-    whole = [[''] * len(names) if row in bad else cells for row, cells in enumerate(rows)]
-    columns: dict[str, AnyArray] = {}
-    words: dict[int, str] = {}  # in unused columns of numbers
-    for name, cells in zip(names, zip(*whole, strict=True), strict=True):
-        points = [_with_point(cell) for cell in cells] if form.decimal == ',' else cells
-        values = np.array([number_of(cell) for cell in points])
-        text = name in mapping.texts()
-        numeric = name in numbers or (not text and np.isfinite(values).mean() > NUMERIC)
-        for row in np.flatnonzero(np.isnan(values)).tolist() if numeric else ():
-            if name in numbers and cells[row].lower() not in BLANK:
-                bad.setdefault(row, _reason(name, cells[row], form))
-            elif row not in bad and WORD.search(cells[row]) and cells[row].lower() not in NO_WORD:
-                words[row] = name
-        if numeric and not text:
-            _refuse_commas(name, cells, form, delimiter)
-        columns[name] = values if numeric and not text else _texts(cells)
-    # What another recording, or a row of units or means, looks like.
-    for row in bad:
-        if {*rows[row]} & {*names}:
-            raise InvalidData(
-                f'row {lines[row][0]}: the names of the columns come again, {", ".join(rows[row][:5])}, so '
-                'another recording may begin there; split the file there'
-            )
-    if unlike := sorted(words.keys() - bad.keys()):
-        name = words[unlike[0]]
-        raise InvalidData(
-            f"row {lines[unlike[0]][0]}, column '{name}': a word in a column of numbers that no key uses: the row may "
-            f"be one of units or means; remove it, or read texts there by rows: {{{name!r}: '*'}}"
-        )
+    columns = {name: np.concatenate([part[name] for part in parts]) for name in names}
+    marked, numbered = np.concatenate(junk), np.concatenate(lines)
     # A malformed row ends no slide: it has the texts of the one before.
-    marked = np.isin(np.arange(len(rows)), list(bad))
-    last = np.maximum.accumulate(np.where(marked, np.argmin(marked), np.arange(len(rows))))
+    last = np.maximum.accumulate(np.where(marked, np.argmin(marked), np.arange(len(marked))))
     columns = {name: column[last] if column.dtype.kind == 'O' else column for name, column in columns.items()}
-    reasons = [f'row {lines[row][0]}, {bad[row]}' for row in sorted(bad)[:EXAMPLES]]
-    yield TableFrame(place, columns, lines=np.array([number for number, _ in lines]), junk=marked, reasons=reasons)
+    yield TableFrame(place, columns, lines=numbered, junk=marked, reasons=reasons)
 
 
 def _names(cells: Sequence[str], form: FileFormat) -> list[str]:
@@ -362,6 +370,8 @@ def _read_hdf5(
 
         def note(name: str, member: Any) -> None:
             """Keep a data set; the elements of references, as of cells and arrays of structs of MATLAB, from 1 on."""
+            if len(found) > MAX_ARRAYS or name.count('/') > 20:
+                raise InvalidData(f'it has more than {MAX_ARRAYS} data sets, or circles of them; split it')
             if isinstance(member, h5py.Group):
                 for part, inner in member.items():
                     note(f'{name}/{part}', inner)
@@ -581,6 +591,8 @@ def _fields_of(value: Any, msgtype: str) -> dict[str, Any]:
             numbers = zip(value.name, getattr(value, kind), strict=False)
             found |= {f'{kind}.{joint}': number for joint, number in numbers}
     else:
+        if sum(axis.size > 1 for axis in getattr(getattr(value, 'layout', None), 'dim', ())) > 1:
+            raise InvalidData('its array has several dimensions; republish it flat, or use `SlideDataset.from_arrays`')
         _values(value, '', found)
     return found
 

@@ -292,7 +292,9 @@ class FrameSlides:
             if not mask.any():
                 has = ', '.join(sorted({*texts.tolist()})[:5])
                 raise InvalidData(f"column '{name}' has no row '{value}'; it has {has}")
-            if any(not one.time.column for one in self._mapping.streams.values()) and frame.reasons:
+            good = np.flatnonzero(np.ones(len(mask)) if frame.junk is None else ~frame.junk)
+            between = (np.diff(good) > 1).any()  # behind the last good row nothing shifts
+            if between and any(not one.time.column for one in self._mapping.streams.values()):
                 raise InvalidData(
                     f'{frame.reasons[0]}: of a malformed row nobody knows whether it is one of those under `rows`, so '
                     'without a column of time the rows behind it may shift; give one, or remove the row'
@@ -440,6 +442,8 @@ class FrameSlides:
             if name in used or not plain or self._group(name) != self._reference.group:
                 continue
             values = self._frame.texts(name) if array.dtype.kind in 'OUSb' else self._frame.numbers(name)
+            if values.dtype.kind == 'O' and not _is_code(name) and len({*values.tolist()} - {''}) > MANY_TEXTS:
+                continue
             for span in self._spans:
                 rows = self._reference.rows[span]
                 rows = rows[values[rows] != ''] if values.dtype.kind == 'O' else rows[np.isfinite(values[rows])]
@@ -660,7 +664,7 @@ def _mixed(values: AnyArray, *, named: bool) -> int:
     changes, count = np.flatnonzero(codes[1:] != codes[:-1]) + 1, len(found)
     mixed = 2 <= count <= len(values) / ROWS_A_CODE
     if values.dtype.kind == 'O':
-        mixed &= named or (count <= MANY_TEXTS and not {text.lower() for text in found.tolist()} <= FLAGS)
+        mixed &= named or not {text.lower() for text in found.tolist()} <= FLAGS
     elif not named and mixed:
         in_blocks = len(changes) == count - 1 and not {*found.tolist()} <= {0.0, 1.0}
         in_turn = len(changes) > 0.5 * len(codes) and (codes[count:] == codes[:-count]).mean() > IN_TURN

@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import argparse
+import re
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +55,12 @@ def _import_mapped(options: argparse.Namespace) -> list[Path]:
     report = import_tables(load_mapping(mapping), source, out, MAPPED[options.data_set])
     for line in report.lines():
         print(line)
+    stems = Counter(re.sub(r'[ _-]?\d+$', '', name) for name in report.slides)
+    if numbered := [name for name in report.slides if stems[re.sub(r'[ _-]?\d+$', '', name)] > 1]:
+        print(
+            f'surfaces that differ by a number alone: {", ".join(numbered)}; if it belongs to no label, give it a '
+            'separate field in `files` of the mapping, such as {material}_{run:d}'
+        )
     return report.bags
 
 

@@ -4,12 +4,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import queue
 import threading
 import time
 from collections import Counter
 from dataclasses import dataclass
+from typing import Any
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -18,8 +18,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from texture_core.config import param
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.ros import DiagnosticReport, Diagnostics, declare, run
-from texture_core.types import Quality, TactileSignal
-from texture_recordings.bags import COMMON, MESSAGES, TYPES, BagWriter, RawMessage, decode, typestore
+from texture_core.types import Quality
+from texture_recordings.bags import COMMON, MESSAGES, BagWriter, Continuity, RawMessage, decode, typestore
 from texture_recordings.ros import TOPICS, message_class
 
 QUEUE = 20_000  # a minute of one finger: a disk that stalls longer loses messages, and they are counted
@@ -53,7 +53,7 @@ class RecordNode(Node):
         self._path, self._all = params.out, params.all
         self._bag = BagWriter(params.out)
         self._counts: Counter[str] = Counter()
-        self._next_samples: dict[str, int] = {}  # by topic: index that its next batch begins with if nothing is lost
+        self._continuity = Continuity()
         self._queue: queue.Queue[RawMessage | None] = queue.Queue(QUEUE)
         self._error: OSError | None = None
         self._writer = threading.Thread(target=self._write, name='writer')
@@ -122,22 +122,15 @@ class RecordNode(Node):
             try:
                 if message is not NOTHING:
                     self._bag.write_raw(message)
-                    self._counts['messages'] += 1
-                    self._count_lost(message)
                 if time.monotonic() - flushed_s >= FLUSH_S:
                     flushed_s = time.monotonic()
                     self._bag.flush()
-            except OSError as error:  # noqa: PERF203 – a disk is slower
+            except OSError as error:
                 self._error = self._error or error
-
-    def _count_lost(self, message: RawMessage) -> None:
-        """Count the samples that are missing before a batch; an index that goes back is a restart of its driver."""
-        if message.msgtype == TYPES[TactileSignal]:
-            with contextlib.suppress(InvalidData):
-                signal = decode(message.data, message.msgtype)
-                first = self._next_samples.get(message.topic, signal.first_sample)
-                self._counts['lost'] += max(0, signal.first_sample - first)
-                self._next_samples[message.topic] = signal.next_sample
+                continue
+            if message is not NOTHING:
+                self._counts['messages'] += 1
+                self._count_losses(message)
 
     def _next(self) -> RawMessage | None:
         try:
@@ -145,15 +138,34 @@ class RecordNode(Node):
         except queue.Empty:
             return NOTHING
 
+    def _count_losses(self, message: RawMessage) -> None:
+        if not message.msgtype.endswith('/TactileSignal'):
+            return
+        try:
+            signal = decode(message.data, message.msgtype)
+        except InvalidData:
+            self._counts['bad'] += 1
+            return
+        self._continuity.update(message.topic, signal)
+
     def _check(self) -> None:
         if self._error is not None:
             raise InvalidData(f"'{self._path}' cannot be written: {self._error}; free some space and record again")
 
     def _report(self) -> DiagnosticReport:
-        messages, dropped, lost = (self._counts[name] for name in ('messages', 'dropped', 'lost'))
-        sentence = f'{messages} messages recorded, {dropped or "none"} dropped, {lost or "no"} samples lost'
-        numbers = {'messages': messages, 'dropped_messages': dropped, 'lost_samples': lost}
-        return 'WARN' if dropped or lost else 'OK', sentence, numbers
+        lost = sum(self._continuity.lost.values())
+        dropped, bad = self._counts['dropped'], self._counts['bad']
+        faults = {'lost_samples': lost, 'dropped_messages': dropped, 'bad_messages': bad}
+        numbers: dict[str, Any] = {
+            'messages': self._counts['messages'],
+            **faults,
+            'restarts': sum(self._continuity.restarts.values()),
+            **{f'samples {topic}': count for topic, count in self._continuity.samples.items()},
+        }
+        others = [f'{count} {name.replace("_", " ")}' for name, count in faults.items() if count]
+        said = ', '.join(filter(None, (self._continuity.losses, *others[bool(lost) :])))
+        sentence = f'{self._counts["messages"]} messages recorded, {said or "nothing lost"}'
+        return 'WARN' if said else 'OK', sentence, numbers
 
 
 def main() -> None:
