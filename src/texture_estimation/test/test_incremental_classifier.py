@@ -9,9 +9,18 @@ import pytest
 from texture_core.errors import InvalidData, ModelMismatch, TextureError
 from texture_core.types import FeatureVector
 from texture_estimation.domain import Domain
-from texture_estimation.incremental import IncrementalClassifier
+from texture_estimation.incremental import ChangeRefused, IncrementalClassifier
 from texture_estimation.model import load_model
+from texture_estimation.recipe import Recipe
+from texture_estimation.training import train
 from texture_features.feature_set import SlideConditions
+
+TREES = {'sklearn': {'estimator': 'sklearn.ensemble:ExtraTreesClassifier', 'random_state': 0}}
+
+
+def trained(learner, examples):
+    content = {'inputs': {'signal': {'features': ['mean']}}, 'learner': learner}
+    return train(Recipe.from_mapping(content, 'other'), examples)
 
 
 @pytest.fixture
@@ -244,5 +253,16 @@ def test_an_added_slide_whose_values_overflow_is_refused_with_a_sentence(three_a
     content = json.loads(first.read_text())
     content['values'][0][0] = 1e300
     first.write_text(json.dumps(content))
-    with pytest.raises(ModelMismatch, match=r'the added slides of model .* cannot be used: .*; move them away'):
+    sentence = 'values are too large to be features'
+    with pytest.raises(ModelMismatch, match=rf'the added slides of model .* cannot be used: its {sentence}; move them'):
         load_model(path)
+
+
+@pytest.mark.filterwarnings('ignore:overflow', 'ignore:invalid value')
+@pytest.mark.parametrize('learner', ['discriminant', TREES])
+def test_windows_whose_values_overflow_are_not_added(learner, examples, silk, measured):
+    classifier = IncrementalClassifier(trained(learner, examples))
+    measured(classifier, 1e300 * silk)
+    with pytest.raises(ChangeRefused, match="the slide 'e1' cannot be added: its values are too large to be features"):
+        classifier.add('silk')
+    assert not classifier.model.added_slides

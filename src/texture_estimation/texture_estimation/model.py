@@ -582,7 +582,9 @@ class TextureModel(StoredModel):
         """
         nothing = np.zeros(len(self.names))
         answer = self.predict_log_proba(nothing)
-        if answer.shape != (len(self.labels),) or np.isnan(answer).any():
+        if np.isnan(answer).any():
+            raise ModelMismatch('its values are too large to be features')
+        if answer.shape != (len(self.labels),):
             raise ModelMismatch(f'it answers {answer.shape} numbers, its card names {len(self.labels)} labels')
         if self.acceptance.distance is not None:
             self.acceptance.assess(0.0, float(self.acceptance.distance.score(self.compared(nothing), 0)), 1.0)
