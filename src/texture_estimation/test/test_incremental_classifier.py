@@ -62,6 +62,18 @@ def test_one_slide_adds_a_texture_and_the_others_stay_known(model, examples, sil
     np.testing.assert_allclose(np.diff(now[:, :-1]), np.diff(trained), atol=1e-9)  # which keep their ratios
 
 
+def test_trees_keep_what_they_were_trained_on_when_a_slide_is_added(make_examples, silk, measured):
+    examples = make_examples(slides=12)
+    later = make_examples(slides=12, seed=1)
+    classifier = IncrementalClassifier(trained(TREES, examples))
+    before = classifier.model.decide(later.values)
+    measured(classifier, silk)
+    classifier.add('silk')
+    after = classifier.model.decide(later.values)
+    right, kept = (np.mean(np.array(of) == later.labels) for of in (before, after))
+    assert kept > right - 0.03
+
+
 def test_more_examples_of_a_known_texture_add_no_label(model, examples, measured):
     classifier = IncrementalClassifier(model)
     moved = examples.values[examples.labels == 'wood'][:8] + np.array([0, 0, 0, 0, 0, 9.0])

@@ -481,7 +481,7 @@ class TextureModel(StoredModel):
             return scores, compared
         # Trained textures keep the ratios of their probabilities; what was added to one of them is a separate class.
         weights, offsets, codes = self._added
-        by_class = log_softmax(np.concatenate([compared, scores], axis=-1) @ weights + offsets)
+        by_class = log_softmax(compared @ weights + offsets)
         log_proba, n = np.full((*scores.shape[:-1], len(self.labels)), -np.inf), self.n_trained
         log_proba[..., :n] = log_softmax(scores) + np.logaddexp.reduce(by_class[..., :n], axis=-1, keepdims=True)
         log_proba[..., codes] = np.logaddexp(log_proba[..., codes], by_class[..., n:])
@@ -498,18 +498,16 @@ class TextureModel(StoredModel):
     def _added(self) -> tuple[Array, Array, Codes] | None:
         """A discriminant of the trained and the added classes, (n_inputs, n_classes), and the labels of the added ones.
 
-        None if nothing was added, or if the learner itself learns it.
+        Scores are no input of it: on the windows of the training those of trees are better than on any others. None if
+        nothing was added, or if the learner itself learns it.
         """
         if not self.added_slides or self.examples is None or self.learns_online:
             return None
         codes = [self.labels.index(slide.label) for slide in self.added_slides for _ in slide.values]
         added, classes = np.unique(codes, return_inverse=True)
         windows = np.concatenate([self.examples.values, *(slide.values for slide in self.added_slides)])
-        scores, compared = self._predict_trained(windows)
         y = np.concatenate([self.examples.codes, self.n_trained + classes])
-        weights, offsets = linear_discriminant(
-            np.concatenate([compared, scores], axis=1), y, self.n_trained + len(added), SHRINKAGE
-        )
+        weights, offsets = linear_discriminant(self.compared(windows), y, self.n_trained + len(added), SHRINKAGE)
         return INVERSE_TEMPERATURE * weights, INVERSE_TEMPERATURE * offsets, added
 
     def predict_log_proba(self, X: Array) -> Array:
