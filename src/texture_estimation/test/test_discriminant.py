@@ -43,6 +43,19 @@ def test_gaussian_classes_of_known_means_and_variance_get_their_probabilities():
     assert scores[:, 1] - scores[:, 0] == pytest.approx([-2.0, 0.0, 2.0], abs=0.15)
 
 
+def test_a_label_without_examples_is_nowhere_the_most_probable_and_changes_no_other():
+    rng = np.random.default_rng(1)
+    codes = np.repeat([0, 2], 50)
+    values = 1.0 * codes[:, None] + rng.standard_normal((100, 3))
+    asked = 20.0 * rng.standard_normal((500, 3))
+    (two, offsets), (three, lacking) = (
+        linear_discriminant(values, y, n, 0.1) for y, n in ((codes // 2, 2), (codes, 3))
+    )
+    scores = asked @ three + lacking
+    assert scores[:, [0, 2]] == pytest.approx(asked @ two + offsets)
+    assert (scores.argmax(axis=1) != 1).all()
+
+
 def day(slide):
     return f'day {int(slide[-1]) % 2}'
 

@@ -9,9 +9,18 @@ import pytest
 from texture_core.errors import InvalidData, ModelMismatch, TextureError
 from texture_core.types import FeatureVector
 from texture_estimation.domain import Domain
-from texture_estimation.incremental import IncrementalClassifier
+from texture_estimation.incremental import ChangeRefused, IncrementalClassifier
 from texture_estimation.model import load_model
+from texture_estimation.recipe import Recipe
+from texture_estimation.training import train
 from texture_features.feature_set import SlideConditions
+
+TREES = {'sklearn': {'estimator': 'sklearn.ensemble:ExtraTreesClassifier', 'random_state': 0}}
+
+
+def trained(learner, examples):
+    content = {'inputs': {'signal': {'features': ['mean']}}, 'learner': learner}
+    return train(Recipe.from_mapping(content, 'other'), examples)
 
 
 @pytest.fixture
@@ -51,6 +60,18 @@ def test_one_slide_adds_a_texture_and_the_others_stay_known(model, examples, sil
     assert after > before - 0.03
     trained, now = model.predict_log_proba(examples.values), classifier.model.predict_log_proba(examples.values)
     np.testing.assert_allclose(np.diff(now[:, :-1]), np.diff(trained), atol=1e-9)  # which keep their ratios
+
+
+def test_trees_keep_what_they_were_trained_on_when_a_slide_is_added(make_examples, silk, measured):
+    examples = make_examples(slides=12)
+    later = make_examples(slides=12, seed=1)
+    classifier = IncrementalClassifier(trained(TREES, examples))
+    before = classifier.model.decide(later.values)
+    measured(classifier, silk)
+    classifier.add('silk')
+    after = classifier.model.decide(later.values)
+    right, kept = (np.mean(np.array(of) == later.labels) for of in (before, after))
+    assert kept > right - 0.03
 
 
 def test_more_examples_of_a_known_texture_add_no_label(model, examples, measured):
@@ -244,5 +265,16 @@ def test_an_added_slide_whose_values_overflow_is_refused_with_a_sentence(three_a
     content = json.loads(first.read_text())
     content['values'][0][0] = 1e300
     first.write_text(json.dumps(content))
-    with pytest.raises(ModelMismatch, match=r'the added slides of model .* cannot be used: .*; move them away'):
+    sentence = 'values are too large to be features'
+    with pytest.raises(ModelMismatch, match=rf'the added slides of model .* cannot be used: its {sentence}; move them'):
         load_model(path)
+
+
+@pytest.mark.filterwarnings('ignore:overflow', 'ignore:invalid value')
+@pytest.mark.parametrize('learner', ['discriminant', TREES])
+def test_windows_whose_values_overflow_are_not_added(learner, examples, silk, measured):
+    classifier = IncrementalClassifier(trained(learner, examples))
+    measured(classifier, 1e300 * silk)
+    with pytest.raises(ChangeRefused, match="the slide 'e1' cannot be added: its values are too large to be features"):
+        classifier.add('silk')
+    assert not classifier.model.added_slides

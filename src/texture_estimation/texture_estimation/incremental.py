@@ -13,7 +13,14 @@ import numpy as np
 from texture_core.config import unknown_name
 from texture_core.errors import InvalidData
 from texture_core.types import Array, FeatureVector, checked_label
-from texture_estimation.model import AddedSlide, TextureModel, remove_added_slide, stored_numbers, write_added_slide
+from texture_estimation.model import (
+    BROKEN,
+    AddedSlide,
+    TextureModel,
+    remove_added_slide,
+    stored_numbers,
+    write_added_slide,
+)
 from texture_features.feature_set import RunningConditions
 
 # Number of recent explorations that can be added, and of windows of each.
@@ -70,7 +77,10 @@ class IncrementalClassifier:
         self._refuse_second_time(name, label)
         added_slide = AddedSlide(label, name, np.stack(self._recent_windows[name]), self._conditions[name].get())
         model = self.model.with_added_slides((*self.model.added_slides, added_slide))
-        model.validate()
+        try:
+            model.validate()
+        except BROKEN as error:
+            raise ChangeRefused(f"the slide '{name}' cannot be added: {error}", ChangeError.NO_SLIDE) from error
         if self._path is not None:
             number = self._numbers[-1] + 1 if self._numbers else 1
             write_added_slide(self._path, number, added_slide, self.model.feature_set)

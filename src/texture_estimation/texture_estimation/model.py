@@ -498,7 +498,8 @@ class TextureModel(StoredModel):
     def _added(self) -> tuple[Array, Array, Codes] | None:
         """A discriminant of the trained and the added classes, (n_inputs, n_classes), and the labels of the added ones.
 
-        None if nothing was added, or if the learner itself learns it.
+        Scores are no input of it: on the windows of the training those of trees are better than on any others. None if
+        nothing was added, or if the learner itself learns it.
         """
         if not self.added_slides or self.examples is None or self.learns_online:
             return None
@@ -506,7 +507,6 @@ class TextureModel(StoredModel):
         added, classes = np.unique(codes, return_inverse=True)
         windows = np.concatenate([self.examples.values, *(slide.values for slide in self.added_slides)])
         y = np.concatenate([self.examples.codes, self.n_trained + classes])
-        # Scores are no input: on its own training windows a learner that overfits gives others than on new ones.
         weights, offsets = linear_discriminant(self.compared(windows), y, self.n_trained + len(added), SHRINKAGE)
         return INVERSE_TEMPERATURE * weights, INVERSE_TEMPERATURE * offsets, added
 
@@ -580,7 +580,9 @@ class TextureModel(StoredModel):
         """
         nothing = np.zeros(len(self.names))
         answer = self.predict_log_proba(nothing)
-        if answer.shape != (len(self.labels),) or np.isnan(answer).any():
+        if np.isnan(answer).any():
+            raise ModelMismatch('its values are too large to be features')
+        if answer.shape != (len(self.labels),):
             raise ModelMismatch(f'it answers {answer.shape} numbers, its card names {len(self.labels)} labels')
         if self.acceptance.distance is not None:
             self.acceptance.assess(0.0, float(self.acceptance.distance.score(self.compared(nothing), 0)), 1.0)

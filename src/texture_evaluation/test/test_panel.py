@@ -109,6 +109,7 @@ def test_other_scales_are_mapped_to_grades_and_empty_cells_are_missing(tmp_path:
         (['rater,texture,grade', 'a,cork,1', 'a,wood,2'], 'single rater'),
         (['rater,texture,grade', 'a,cork,1', 'b,cork,2', 'a,wood,'], "nobody graded 'wood'"),
         (['rater,texture,grade', 'a', 'b,cork,2'], 'line 2'),
+        (['rater,texture,grade', *(f'r{n},t{n},1' for n in range(1001))], 'their product may be 1000000'),
     ],
 )
 def test_ratings_that_cannot_be_used_get_a_sentence(lines: list[str], sentence: str, tmp_path: Path) -> None:

@@ -23,6 +23,7 @@ from texture_evaluation.evaluate import summary as report_summary
 from texture_evaluation.train import train_from_bags, train_grades_from_bags
 from texture_features.feature_set import LabelledFeatures, read_recipe
 from texture_recordings.bags import BagWriter, read_bag
+from texture_recordings.dataset import SlideDataset
 from texture_recordings.mapping import mapping_from
 from texture_recordings.tables import import_tables
 
@@ -105,6 +106,22 @@ def test_a_recipe_that_does_not_fit_the_data_is_named(noise: Path, tmp_path: Pat
 def test_a_recipe_of_taxels_names_the_streams_that_a_recording_of_vibration_has(noise: Path) -> None:
     with pytest.raises(ModelMismatch, match="has no 'signal_static', only signal; the windows need signal_static"):
         train_from_bags('taxels-any-day', [noise])
+
+
+@pytest.mark.parametrize(('tared', 'faults'), [(True, 0), (False, 1)])
+def test_a_stream_that_is_not_tared_as_the_recipe_states_is_reported(tared, faults, tmp_path, monkeypatch) -> None:
+    samples = np.random.default_rng(0).normal(size=(8, 100, 3))
+    made = SlideDataset.from_arrays({'signal': list(samples)}, ['cork', 'felt'] * 4, {'signal': 50.0}, sensor='skin')
+    signals = [{'signal': (replace(slide.signals['signal'][0], tared=tared),)} for slide in made]
+    slides = SlideDataset(tuple(replace(slide, signals=of) for slide, of in zip(made, signals, strict=True)))
+    monkeypatch.setattr(SlideDataset, 'from_bags', lambda *_, **__: slides)
+    content = {'learner': 'discriminant', 'inputs': {'signal': {'tare': 'tared', 'features': ['mean']}}}
+    (tmp_path / 'mine.yaml').write_text(json.dumps(content))
+    model = train_from_bags(str(tmp_path / 'mine.yaml'), [tmp_path])
+    found = model.training.get('tare', []), evaluate(model, [tmp_path]).tare_faults
+    assert [[sentence[:32] for sentence in of] for of in found] == [
+        ["the recipe expects 'signal' tared"[:32]] * faults
+    ] * 2
 
 
 def test_bags_and_grades_make_a_model_whose_card_lists_them(simulated, tmp_path) -> None:

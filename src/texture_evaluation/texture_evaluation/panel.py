@@ -23,6 +23,7 @@ from texture_evaluation.charts import COLOURS, chart
 # Ratings from 1 (smooth) to 5 (rough) that people gave textures, and the table they are read from.
 
 RATINGS_GRADES = np.arange(1, 6)
+MAX_CELLS = 1_000_000  # people × textures
 COLUMNS = ('rater', 'texture', 'grade')
 
 
@@ -68,6 +69,10 @@ def read_ratings(path: str | Path, scale: tuple[float, float] = (SMOOTH, ROUGH))
             rating = checked_grade(row['grade'], where, scale, ', or name another scale with --scale')
             given[key] = SMOOTH + (ROUGH - SMOOTH) * (rating - low) / (high - low)
     raters, textures = (tuple(dict.fromkeys(names)) for names in zip(*given, strict=True))
+    if len(raters) * len(textures) > MAX_CELLS:
+        raise InvalidData(
+            f"'{path}' has {len(raters)} raters and {len(textures)} textures; their product may be {MAX_CELLS}"
+        )
     grades = np.array([[given.get((rater, texture), math.nan) for texture in textures] for rater in raters])
     empty = np.isnan(grades).all(axis=0)
     if empty.any():

@@ -15,6 +15,7 @@ from texture_features.feature_set import FeatureSet
 from texture_features.windows import (
     AxisJoiner,
     CutWindow,
+    SlideCoverage,
     SlideEnd,
     WindowCutter,
     WindowParams,
@@ -141,6 +142,16 @@ def test_a_stream_that_begins_late_or_again_costs_only_its_windows():
     late = run({'signal': stream(1.0, begin_s=0.35)}, [state(0.0, steady_s=1.0), state(1.0, Phase.LIFT)])
     assert starts(late) == [0.4, 0.5]
     assert late[-1].skipped == 4
+
+
+@pytest.mark.parametrize(('begin_s', 'windows'), [(3599.0, 6), (0.0, 6), (7200.0, 0)])
+def test_an_hour_without_samples_is_passed_over_at_once_and_counted(begin_s, windows, monkeypatch):
+    calls = []
+    window = SlideCoverage.window
+    monkeypatch.setattr(SlideCoverage, 'window', lambda slide: calls.append(1) or window(slide))
+    *cut, end = run({'signal': stream(1.0, begin_s=begin_s)}, [state(0.0, steady_s=3600.0)])
+    assert (len(cut), end.skipped) == (windows, 35_996 - windows)
+    assert len(calls) < 250  # one for each batch, and few more
 
 
 def test_speed_and_force_are_means_over_the_window():

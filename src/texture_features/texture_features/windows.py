@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import cmath
 import dataclasses
-import enum
 import heapq
 import math
 from bisect import bisect_right
@@ -607,13 +606,6 @@ class SlideEnd:
 WindowEvent = CutWindow | SlideEnd
 
 
-class _Missing(enum.Enum):
-    """Why a window is not there."""
-
-    LATE = enum.auto()  # samples that have not come yet
-    LOST = enum.auto()  # samples that were lost or are not finite
-
-
 class WindowCutter:
     """Turn signal batches and exploration states into windows, in whatever order they arrive.
 
@@ -713,10 +705,10 @@ class WindowCutter:
         """Cut what can be cut of a slide; return whether it is used up."""
         while span := slide.window():
             found = self._find(slide, span)
-            if found is _Missing.LATE:
+            if found == 0:
                 return False
-            if isinstance(found, _Missing):
-                self._skip(slide, 1)
+            if isinstance(found, int):
+                self._skip(slide, found)
                 continue
             slide.advance()
             event: CutWindow | None = CutWindow(
@@ -740,22 +732,23 @@ class WindowCutter:
                 events.append(event)
         return slide.ended
 
-    def _find(self, slide: SlideCoverage, span: CoveredSpan) -> dict[str, Window] | _Missing:
+    def _find(self, slide: SlideCoverage, span: CoveredSpan) -> dict[str, Window] | int:
+        """Return a window, or how many from this one on are lost; 0 if samples have not come yet."""
         windows = {}
         for topic, source in self._inputs.items():
             found = self._find_in(source, slide, span)
-            if isinstance(found, _Missing):
+            if isinstance(found, int):
                 return found
             windows[topic] = found
         return windows
 
-    def _find_in(self, source: BufferedStream, slide: SlideCoverage, span: CoveredSpan) -> Window | _Missing:
+    def _find_in(self, source: BufferedStream, slide: SlideCoverage, span: CoveredSpan) -> Window | int:
         """Look for a window in the runs of a stream; only the newest can still grow."""
-        state = _Missing.LATE
+        lost = 0
         for buffer in source.buffers:
             anchor = source.anchors.get(buffer) or buffer.anchor(slide.start_ns)
             if anchor is None:
-                state = _Missing.LATE
+                lost = 0
                 continue
             source.anchors[buffer] = anchor
             first = buffer.index_at(span.start_ns, anchor)
@@ -763,11 +756,13 @@ class WindowCutter:
             if first >= buffer.first_sample and first + count <= buffer.next_sample:
                 samples = buffer.take(first, count)
                 if not np.isfinite(samples).all():
-                    return _Missing.LOST
+                    return 1
                 rate_hz, names, sensor = buffer.rate_hz, buffer.channels, buffer.sensor
                 return Window(samples, rate_hz, names, span.start_ns, span.speed_m_s, span.force_n, sensor)
-            state = _Missing.LOST if first < buffer.first_sample else _Missing.LATE
-        return state
+            # What begins before the first sample is lost: a gap of an hour is passed over at once.
+            missing_s = (buffer.first_sample - first - 1) / buffer.rate_hz
+            lost = 0 if first >= buffer.first_sample else min(lost or ALL, max(1, int(missing_s / self._params.hop_s)))
+        return lost
 
     def _skip(self, slide: SlideCoverage, count: int) -> None:
         skipped = slide.advance(count)

@@ -28,6 +28,7 @@ from texture_estimation.learners.learner import (
 # Linear discriminant analysis with a shrunk covariance, as one linear layer.
 
 CONSTANT = 1e-12
+ABSENT = 7.0  # how far a label without examples is below the mean score of the others: a thousandth
 
 
 def linear_discriminant(
@@ -42,21 +43,24 @@ def linear_discriminant(
 ) -> tuple[Array, Array]:
     """Return the layer that gives the log-probabilities of Gaussian classes with one covariance, up to a constant.
 
+    A label without examples is nowhere the most probable.
+
     Source: Fisher 1936; Friedman 1989, "Regularized discriminant analysis"; Hatch et al. 2006, "Within-class covariance
     normalization for SVM-based speaker recognition", for the differences between places.
     """
     counted = np.ones(len(X)) if weights is None else weights
-    counted = counted / np.bincount(y, counted, n_labels)[y]  # in each class they add up to 1
-    means = _sums(X, y, counted, n_labels)
-    centre = means.mean(axis=0)
+    totals = np.bincount(y, counted, n_labels)
+    counted = counted / totals[y]  # in each class they add up to 1
+    means, present = _sums(X, y, counted, n_labels), totals > 0
+    centre = means[~present] = means[present].mean(axis=0)
     rest = X - means[y]
-    place_weights = counted / n_labels
+    place_weights = counted / present.sum()
     covariance = (rest.T * place_weights) @ rest
     if stretches is not None and stretch_weight:
         places = np.unique(np.stack([y, stretches]), axis=1, return_inverse=True)[1].reshape(-1)
-        totals = np.bincount(places, place_weights)
-        between = _sums(rest, places, place_weights, len(totals)) / totals[:, None]
-        covariance += stretch_weight * (between.T * totals) @ between
+        shares = np.bincount(places, place_weights)
+        between = _sums(rest, places, place_weights, len(shares)) / shares[:, None]
+        covariance += stretch_weight * (between.T * shares) @ between
     scale = np.sqrt(np.diag(covariance))
     scale[scale <= CONSTANT * (1.0 + np.abs(centre))] = np.inf
     correlations = shrunk_covariance(covariance / np.outer(scale, scale), shrinkage)
@@ -64,6 +68,8 @@ def linear_discriminant(
     relative = (means - centre) / scale
     layer = np.linalg.solve(correlations, relative.T)
     offsets = -0.5 * np.einsum('cf,fc->c', relative, layer)
+    # Everywhere the scores of the others have this mean, so that the highest of them is above that of an absent one.
+    offsets[~present] = offsets[present].mean() - ABSENT
     layer /= scale[:, None]
     return layer, offsets - centre @ layer
 
