@@ -9,7 +9,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # Tests that run against the clock mostly wait, but a crowd of them would disturb one another. One that fails in the crowd
 # runs once more with nothing beside it, and both results are printed; it fails if it fails alone.
 TEST_JOBS ?= 3
-REALTIME_JOBS ?= 4
+REALTIME_JOBS ?= 3
 BENCHMARK_JOBS ?= 2
 TESTS := $(RUN) python -m pytest --dist loadfile
 # In the order of conftest.py: the files with the longest tests begin early, those with the most tests need not.

@@ -179,7 +179,8 @@ def test_an_operator_explores_sees_the_estimate_tares_and_stops_the_next_explora
     page.until(lambda frame: frame['past'][0]['phase'] == 'aborted')
 
 
-def test_the_sample_can_be_swapped_and_an_unknown_one_gets_the_nearest(operator) -> None:
+def test_the_sample_can_be_swapped_and_an_unknown_one_gets_the_nearest(operator, models) -> None:
+    operator.set_parameters('classifier', {'model': str(models['vibration'])})
     operator.set_parameters('emulator', {'surface': 'glass'})
     assert operator.explore(SLIDE).texture.label == 'glass'
     with pytest.raises(InvalidParameter, match="did you mean 'leather'"):
