@@ -382,8 +382,11 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
         fitted, codes, groups, recipe.evidence, hop_ratio, temperature=fitted.temperature
     )
     calibrated, truth = fitted, codes
-    margins: Any = {'speed_margin': recipe.training.speed_margin, 'force_margin': recipe.training.force_margin}
-    domain = replace(Domain.of_slides(conditions, of_slides), **margins)
+    domain = replace(
+        Domain.of_slides(conditions, of_slides),
+        speed_margin=recipe.training.speed_margin,
+        force_margin=recipe.training.force_margin,
+    )
     acceptance = Acceptance(0 if fitted.held_out is None else len(slides), recipe.training.rates, domain)
     if not acceptance.reason:
         followed_slides = Followed(bound, examples)

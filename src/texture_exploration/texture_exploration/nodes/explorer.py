@@ -288,7 +288,8 @@ class ExplorerNode(PatientLifecycleNode):
             result.error_code, result.message = int(refusal(error)), str(error)
             result.field = 'motion' if isinstance(error, UnknownName) else error.field
             # Their numbers are NaN, not the zeros that a new message holds.
-            result.texture, result.roughness = map(to_msg, no_estimates('').values())
+            nothing = no_estimates('')
+            result.texture, result.roughness = to_msg(nothing['texture']), to_msg(nothing['roughness'])
             self.get_logger().warning(f'refused: {error}')
             return result
         estimates = self._open[exploration.exploration_id] = no_estimates(exploration.exploration_id)
@@ -304,7 +305,7 @@ class ExplorerNode(PatientLifecycleNode):
         outcome = exploration.outcome
         result.error_code, result.message, result.lifted = int(outcome.error), outcome.message, outcome.lifted
         result.exploration_id = exploration.exploration_id
-        result.texture, result.roughness = map(to_msg, estimates.values())
+        result.texture, result.roughness = to_msg(estimates['texture']), to_msg(estimates['roughness'])
         of_model = (result.texture.model, result.texture.revision) == (self._model.model, self._model.revision)
         result.labels = self._model.labels if of_model and result.texture.probabilities else []
         self._last_end = outcome.sentence(exploration.exploration_id)
