@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -256,13 +257,6 @@ class Rates:
     coverage: float = 0.95
 
 
-class Assessment(NamedTuple):
-    """Decision about a slide so far."""
-
-    rejection: Rejection
-    decided: bool
-
-
 @dataclass(frozen=True, eq=False)
 class Acceptance:
     """Whether the label of a slide is accepted, and why not; whether the slide may end; which labels it may have.
@@ -321,7 +315,10 @@ class Acceptance:
                 probable.append(float(posterior[slide.truth]))
             least = sorted(probable)[rank - 1] if rank else 0.0
             levels.append(_limits_at(length, usual, beyond, self.rates, least))
-        found = replace(self, levels=np.array(levels), distance=distance)
+        # A slide is assessed many times: early limits are as strict as late ones.
+        fitted, strict = np.array(levels), [Limits._fields.index(name) for name in ('accepted', 'accepted_far')]
+        fitted[:, strict] = np.maximum.accumulate(fitted[::-1, strict])[::-1]
+        found = replace(self, levels=fitted, distance=distance)
         return replace(found, decided_score=found._fit_decided([*near, *far]))
 
     # ---- too little training
@@ -383,15 +380,14 @@ class Acceptance:
         pairs = zip(self._rows[after - 1], self._rows[after], strict=True)
         return Limits._make([one if one == other else one + weight * (other - one) for one, other in pairs])
 
-    def assess(self, margin: float, distance: float, effective_windows: float) -> Assessment:
-        """Return the decision about a slide from the margin of its label and the distance to the slides of it."""
+    def assess(self, margin: float, distance: float, effective_windows: float) -> tuple[Rejection, bool]:
+        """Return the rejection of a slide and whether it is decided, from its margin and distance to its label."""
         if self.distance is None or (self.added and self.reason):
-            return Assessment(Rejection.TOO_LITTLE_TRAINING, decided=False)
+            return Rejection.TOO_LITTLE_TRAINING, False
         limits = self.limits(effective_windows)
         if not limits.accepts(margin, distance):
-            return Assessment(Rejection.NOVEL if distance > limits.novel else Rejection.AMBIGUOUS, decided=False)
-        decided = not self.decided_reason and limits.score(margin, distance) >= self.decided_score
-        return Assessment(Rejection.NONE, decided)
+            return Rejection.NOVEL if distance > limits.novel else Rejection.AMBIGUOUS, False
+        return Rejection.NONE, not self.decided_reason and limits.score(margin, distance) >= self.decided_score
 
     def members(self, probabilities: Array, effective_windows: float) -> list[int]:
         """Return the numbers of the labels in the prediction set, the most probable first; none if too few slides."""
@@ -405,19 +401,22 @@ class Acceptance:
         """Return the least score at which slides end early and rarely with a wrong label, disturbed or not."""
         if self.decided_reason:
             return NEVER
-        scores = []
+        # Of all tests, and of those as they are, few end wrong. Each test after each window: its highest score so far
+        # while it was accepted, and whether its label is right.
+        tests: defaultdict[tuple[bool, bool], list[tuple[Array, NDArray[np.bool_]]]] = defaultdict(list)
         for slide in slides:
             limits = [self.limits(length) for length in slide.effective_windows.tolist()]
-            rows = zip(limits, slide.scored.tolist(), strict=True)
-            scores.append(np.array([one.score(*row) if one.accepts(*row) else -math.inf for one, row in rows]))
-        of = np.array([bool(slide.disturbance) for slide in slides])
-        allowed = {kind: int(self.rates.max_error_rate * (of == kind).sum()) for kind in (False, True)}
-        tried = np.unique(
-            np.quantile([s.max() for s in scores if np.isfinite(s.max())] or [NEVER], np.linspace(0, 1, 50))
-        )
-        for least in tried.tolist():
-            ends = [(score >= least).argmax() if score.max() >= least else -1 for score in scores]
-            errors = np.array([end >= 0 and not slide.right[end] for end, slide in zip(ends, slides, strict=True)])
-            if all(errors[of == kind].sum() <= most for kind, most in allowed.items()):
+            for known, rows in ((True, slide.scored), (False, slide.unknown)):
+                pairs = zip(limits, rows.tolist(), strict=True)
+                scores = np.array([one.score(*row) if one.accepts(*row) else -math.inf for one, row in pairs])
+                for kind in {known, False}:
+                    tests[kind, bool(slide.disturbance)].append((np.maximum.accumulate(scores), slide.right & known))
+        highest = [scores[-1] for each in tests.values() for scores, _ in each if math.isfinite(scores[-1])]
+        for least in np.quantile(highest or [NEVER], np.linspace(0, 1, 50)).tolist():
+            if all(
+                sum(scores[-1] >= least and not right[scores.searchsorted(least)] for scores, right in each)
+                <= int(self.rates.max_error_rate * len(each))
+                for each in tests.values()
+            ):
                 return float(least)
         return NEVER
