@@ -214,25 +214,24 @@ def _results(model: TextureModel, slides: SlideDataset) -> list[SlideResult]:
 
 
 def _unknown_materials(options: BenchmarkOptions, trained: SlideDataset, tested: SlideDataset) -> dict[str, Any]:
-    """Return the fractions of slides over untrained materials that are accepted, and of trained ones rejected."""
+    """Return fractions of slides: over untrained materials accepted, and ended early; over trained ones rejected."""
     labels = np.unique(trained.labels)
     found: dict[str, Any] = {}
     for name in RECIPES:
         recipe, rng = load_recipe(name), np.random.default_rng(options.seed)
         examples, features = training_examples(recipe, trained), tested.features(recipe.feature_set)
-        accepted, rejected = [], []
+        accepted, ended, rejected = [], [], []
         for draw in range(DRAWS):
             unknown = rng.choice(labels, LEFT_OUT, replace=False)
             known = np.unique(examples.groups[~np.isin(examples.labels, unknown)])
-            ends = [
-                (one.surface, end)
-                for one in predict_slides(train(recipe, examples.of_slides(known)), features).values()
-                if (end := one.after(UNKNOWN_S)) is not None
-            ]
+            results = predict_slides(train(recipe, examples.of_slides(known)), features).values()
+            ends = [(one.surface, end) for one in results if (end := one.after(UNKNOWN_S)) is not None]
+            early = [one.early() for one in results if one.surface in unknown]
             accepted.append(float(np.mean([end.accepted for surface, end in ends if surface in unknown])))
+            ended.append(float(np.mean([one.decided and one.accepted for one in early])))
             rejected.append(float(np.mean([not end.accepted for surface, end in ends if surface not in unknown])))
             print(f'trust, unknown materials, {name}: {draw + 1} of {DRAWS} trainings', flush=True)
-        found[name] = {'accepted': accepted, 'false_rejection_rate': float(np.mean(rejected))}
+        found[name] = {'accepted': accepted, 'ended_early': ended, 'false_rejection_rate': float(np.mean(rejected))}
     return found
 
 
