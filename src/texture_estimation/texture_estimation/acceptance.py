@@ -401,22 +401,21 @@ class Acceptance:
         """Return the least score at which slides end early and rarely with a wrong label, disturbed or not."""
         if self.decided_reason:
             return NEVER
-        # Of all tests, and of those as they are, few end wrong. Each test after each window: its highest score so far
-        # while it was accepted, and whether its label is right.
+        # Each test after each window: its highest score so far while it was accepted, and whether its label is right.
         tests: defaultdict[tuple[bool, bool], list[tuple[Array, NDArray[np.bool_]]]] = defaultdict(list)
         for slide in slides:
             limits = [self.limits(length) for length in slide.effective_windows.tolist()]
             for known, rows in ((True, slide.scored), (False, slide.unknown)):
                 pairs = zip(limits, rows.tolist(), strict=True)
                 scores = np.array([one.score(*row) if one.accepts(*row) else -math.inf for one, row in pairs])
-                for kind in {known, False}:
-                    tests[kind, bool(slide.disturbance)].append((np.maximum.accumulate(scores), slide.right & known))
+                if known or not slide.disturbance:
+                    tests[known, bool(slide.disturbance)].append((np.maximum.accumulate(scores), slide.right & known))
         highest = [scores[-1] for each in tests.values() for scores, _ in each if math.isfinite(scores[-1])]
         for least in np.quantile(highest or [NEVER], np.linspace(0, 1, 50)).tolist():
             if all(
                 sum(scores[-1] >= least and not right[scores.searchsorted(least)] for scores, right in each)
-                <= int(self.rates.max_error_rate * len(each))
-                for each in tests.values()
+                <= int(self.rates.max_error_rate * len(each) * (1 if known else TRIALS))
+                for (known, _), each in tests.items()
             ):
                 return float(least)
         return NEVER
