@@ -6,7 +6,6 @@ Next to `texture launch emulator`: .venv/bin/ros-run python examples/explore_cli
 """
 
 from enum import Enum
-from typing import Any
 
 import rclpy
 from rclpy.action import ActionClient
@@ -15,25 +14,19 @@ from std_srvs.srv import Trigger
 from texture_msgs.action import Explore
 from texture_msgs.msg import ExplorationRequest, ExplorationResult, TextureEstimate
 
-Next = Enum(
-    'Next',
-    'USE_LABEL CORRECT_REQUEST ASK_LATER EXPLORE_AGAIN CALL_A_PERSON '
-    'TRAIN_IT SLIDE_ELSEWHERE SLIDE_AS_TRAINED SLIDE_LONGER LOAD_A_MODEL TRAIN_MORE',
-)
+Next = Enum('Next', 'USE_LABEL FIX_REQUEST WAIT RETRY ASK_HELP TRAIN ELSEWHERE AS_TRAINED LONGER LOAD_MODEL TRAIN_MORE')
 R, E = ExplorationResult, TextureEstimate
-REFUSED = {
-    **dict.fromkeys((R.ERROR_UNKNOWN_MOTION, R.ERROR_INVALID_REQUEST), Next.CORRECT_REQUEST),
-    **dict.fromkeys((R.ERROR_UNUSED_FIELD, R.ERROR_OUTSIDE_WORKSPACE), Next.CORRECT_REQUEST),
-    **dict.fromkeys((R.ERROR_BUSY, R.ERROR_NOT_ACTIVE, R.ERROR_ARM_NOT_READY), Next.ASK_LATER),
-    R.ERROR_INTERNAL: Next.CALL_A_PERSON,
-}
-REJECTED = {
+# Refused: the request must be corrected, or may be repeated later.
+INVALID = {R.ERROR_UNKNOWN_MOTION, R.ERROR_INVALID_REQUEST, R.ERROR_UNUSED_FIELD, R.ERROR_OUTSIDE_WORKSPACE}
+NOT_NOW = {R.ERROR_BUSY, R.ERROR_NOT_ACTIVE, R.ERROR_ARM_NOT_READY}
+# Completed: the label may be used, or the same texture needs another slide or training.
+COMPLETED = {
     E.REJECTION_NONE: Next.USE_LABEL,
-    E.REJECTION_NOVEL: Next.TRAIN_IT,
-    E.REJECTION_AMBIGUOUS: Next.SLIDE_ELSEWHERE,
-    E.REJECTION_OUTSIDE_TRAINING: Next.SLIDE_AS_TRAINED,
-    E.REJECTION_TOO_LITTLE_EVIDENCE: Next.SLIDE_LONGER,
-    E.REJECTION_NO_MODEL: Next.LOAD_A_MODEL,
+    E.REJECTION_NOVEL: Next.TRAIN,
+    E.REJECTION_AMBIGUOUS: Next.ELSEWHERE,
+    E.REJECTION_OUTSIDE_TRAINING: Next.AS_TRAINED,
+    E.REJECTION_TOO_LITTLE_EVIDENCE: Next.LONGER,
+    E.REJECTION_NO_MODEL: Next.LOAD_MODEL,
     E.REJECTION_TOO_LITTLE_TRAINING: Next.TRAIN_MORE,
 }
 
@@ -46,12 +39,10 @@ class TextureClient(Node):
         self._explore = ActionClient(self, Explore, 'explore')
         self._stop = self.create_client(Trigger, 'explorer/stop')
 
-    def start(self, **request: Any) -> None:
+    def start(self, **request: object) -> None:
         """Request an exploration; omitted values take the default of the motion."""
-        self.feedback: Any = None
         self._explore.wait_for_server()
-        goal = Explore.Goal(request=ExplorationRequest(**request))
-        sent = self._explore.send_goal_async(goal, lambda message: setattr(self, 'feedback', message.feedback))
+        sent = self._explore.send_goal_async(Explore.Goal(request=ExplorationRequest(**request)))
         rclpy.spin_until_future_complete(self, sent)
         self._goal = sent.result()
         self._ending = self._goal.get_result_async()
@@ -82,15 +73,17 @@ def probabilities(result: ExplorationResult) -> dict[str, float]:
 
 def next_step(result: ExplorationResult) -> Next:
     """Return what to do after a result: the error code first, then the rejection of the label."""
-    if result.error_code in REFUSED:
-        return REFUSED[result.error_code]
-    if result.error_code != R.ERROR_NONE:
-        return Next.EXPLORE_AGAIN if result.lifted else Next.CALL_A_PERSON
-    return REJECTED[result.texture.rejection]
+    code = result.error_code
+    if code == R.ERROR_NONE:
+        return COMPLETED[result.texture.rejection]
+    if code in INVALID:
+        return Next.FIX_REQUEST
+    if code in NOT_NOW:
+        return Next.WAIT
+    return Next.RETRY if result.lifted and code != R.ERROR_INTERNAL else Next.ASK_HELP
 
 
-def main() -> None:
-    """Slide once, and print the next step and the probabilities."""
+if __name__ == '__main__':
     rclpy.init()
     client = TextureClient()
     client.start(motion='linear_slide', early_stopping=True)
@@ -98,7 +91,3 @@ def main() -> None:
         pass
     result = client.result()
     print(next_step(result).name, result.texture.label, probabilities(result))
-
-
-if __name__ == '__main__':
-    main()

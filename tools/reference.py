@@ -16,6 +16,7 @@ import importlib
 import inspect
 import json
 import re
+import textwrap
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, cast
@@ -134,25 +135,32 @@ def _sentence(text: str) -> str:
 
 
 def package_readme(package: Path) -> str:
-    """Return the README of a package: its docstring, its messages or nodes, and its commands."""
+    """Return the README of a package: its docstring, its messages or nodes, and its commands.
+
+    It has no link out of the package, as the pages of ROS show it where docs/ is not.
+    """
     name, parts = package.name, []
     if name == 'texture_msgs':
         parts.append(_interfaces(package))
     else:
-        parts.append((_docstring(package / name / '__init__.py')).strip() + '\n')
+        parts.append(_fenced(_docstring(package / name / '__init__.py')).strip() + '\n')
         nodes = sorted((package / name / 'nodes').glob('[a-z]*.py'))
         if nodes:
             rows = [f'| `ros2 run {name} {path.stem}` | {_docstring(path).splitlines()[0]} |' for path in nodes]
             parts.append('\n'.join(['| node | what it is |', '|---|---|', *rows, '']))
     found = [(command, entry) for command, entry in installed().items() if entry.module.split('.')[0] == name]
     if found:
-        rows = [
-            f'| [`texture {c}`](../../docs/reference/commands.md#{c}) | {_sentence(summary(e))} |' for c, e in found
-        ]
+        rows = [f'| `texture {command}` | {_sentence(summary(entry))} |' for command, entry in found]
         parts.append('\n'.join(['| command | what it does |', '|---|---|', *rows, '']))
     if f'\n## {name}\n' in (FOLDER / 'parameters.md').read_text(encoding='utf-8'):
-        parts.append(f'All parameters are in the [reference](../../docs/reference/parameters.md#{name}).\n')
+        parts.append('All parameters are in `docs/reference/parameters.md`.\n')
     return f'{GENERATED}\n\n# {name}\n\n' + '\n'.join(parts)
+
+
+def _fenced(docstring: str) -> str:
+    """Return a docstring with its blocks of code as Markdown has them."""
+    block = r'\.\. code-block:: (\w+)\n\n((?: {4}.*\n|\n)+)'
+    return re.sub(block, lambda found: f'```{found[1]}\n{textwrap.dedent(found[2]).rstrip()}\n```\n\n', docstring)
 
 
 def _docstring(path: Path) -> str:
@@ -165,8 +173,8 @@ def _interfaces(package: Path) -> str:
     for kind in INTERFACE_KINDS:
         for path in sorted((package / kind).glob(f'*.{kind}')):
             about = split(path.read_text(encoding='utf-8'))[0].split('. ')[0].removesuffix('.')
-            rows.append(f'| [{path.stem}](../../docs/reference/messages.md#{path.stem.lower()}), {kind} | {about}. |')
-    where = 'Who publishes what, and how often: [interfaces](../../docs/interfaces.md).'
+            rows.append(f'| {path.stem}, {kind} | {about}. |')
+    where = 'Who publishes what, and how often: `docs/interfaces.md`. All fields: `docs/reference/messages.md`.'
     return f'{description}\n\n{where}\n\n' + '\n'.join(rows) + '\n'
 
 
@@ -419,8 +427,8 @@ def elements(root: Path) -> str:
 def _elements(path: Path, title: str) -> str:
     rows = ['| element | the paper | here |', '|---|---|---|']
     for block in re.split(r'\n(?=\S)', _docstring(path).partition(':\n\n')[2]):
-        name, paper, here = re.split(r'\n    (?:Paper|Here): ', block)
-        rows.append(f'| {name} | {" ".join(paper.split())} | {" ".join(here.split())} |')
+        cells = re.split(r'\n    :(?:Paper|Here): ', block.replace('|', '\\|'))
+        rows.append(f'| {" | ".join(" ".join(cell.split()) for cell in cells)} |')
     return f'### {title}\n\n' + '\n'.join(rows)
 
 

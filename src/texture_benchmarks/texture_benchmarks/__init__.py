@@ -5,10 +5,10 @@
 Data in: public recordings (`--data DIR`, or the folder that `TEXTURE_DATA` names) or simulated slides. Data out:
 figures as JSON and charts as PNG, in `docs/charts` unless `--out` says otherwise.
 
-```sh
-texture benchmark latency --out out      # `texture benchmark --help` lists the studies
-texture endurance --duration 600 --out days
-```
+.. code-block:: sh
 
-Limits: not deployed on a robot; computing times hold for one machine ([benchmarks](../../docs/benchmarks.md)).
+    texture benchmark latency --out out      # `texture benchmark --help` lists the studies
+    texture endurance --duration 600 --out days
+
+Limits: not deployed on a robot; computing times hold for one machine (`docs/benchmarks.md`).
 """

@@ -25,14 +25,14 @@ SLOW = {'motion': 'linear_slide', 'speed_m_s': 0.01, 'distance_m': 0.1}
 STILL = {'start_height_m': 0.002, 'state_timeout_s': 1.0, 'watch_signal': False}
 R, E, SLIDE = ExplorationResult, TextureEstimate, ExplorationState.PHASE_SLIDE
 REFUSED = {
-    'UNKNOWN_MOTION': Next.CORRECT_REQUEST, 'INVALID_REQUEST': Next.CORRECT_REQUEST,
-    'UNUSED_FIELD': Next.CORRECT_REQUEST, 'OUTSIDE_WORKSPACE': Next.CORRECT_REQUEST,
-    'BUSY': Next.ASK_LATER, 'NOT_ACTIVE': Next.ASK_LATER, 'ARM_NOT_READY': Next.ASK_LATER,
-    'INTERNAL': Next.CALL_A_PERSON,
+    'UNKNOWN_MOTION': Next.FIX_REQUEST, 'INVALID_REQUEST': Next.FIX_REQUEST,
+    'UNUSED_FIELD': Next.FIX_REQUEST, 'OUTSIDE_WORKSPACE': Next.FIX_REQUEST,
+    'BUSY': Next.WAIT, 'NOT_ACTIVE': Next.WAIT, 'ARM_NOT_READY': Next.WAIT,
+    'INTERNAL': Next.ASK_HELP,
 }  # fmt: skip
 REJECTED = {
-    'NONE': Next.USE_LABEL, 'NOVEL': Next.TRAIN_IT, 'AMBIGUOUS': Next.SLIDE_ELSEWHERE,
-    'OUTSIDE_TRAINING': Next.SLIDE_AS_TRAINED, 'TOO_LITTLE_EVIDENCE': Next.SLIDE_LONGER, 'NO_MODEL': Next.LOAD_A_MODEL,
+    'NONE': Next.USE_LABEL, 'NOVEL': Next.TRAIN, 'AMBIGUOUS': Next.ELSEWHERE,
+    'OUTSIDE_TRAINING': Next.AS_TRAINED, 'TOO_LITTLE_EVIDENCE': Next.LONGER, 'NO_MODEL': Next.LOAD_MODEL,
     'TOO_LITTLE_TRAINING': Next.TRAIN_MORE,
 }  # fmt: skip
 
@@ -40,7 +40,7 @@ REJECTED = {
 @pytest.mark.parametrize('error', ExplorationError)
 def test_every_error_gives_a_next_step(error):
     lifted, pressing = (R(error_code=error, lifted=lifted, texture=E(rejection=0)) for lifted in (1, 0))
-    aborted = (Next.EXPLORE_AGAIN, Next.CALL_A_PERSON)  # a finger that may press is the business of a person
+    aborted = (Next.RETRY, Next.ASK_HELP)  # a finger that may press is the business of a person
     expected = (Next.USE_LABEL,) * 2 if not error else (REFUSED[error.name],) * 2 if error.name in REFUSED else aborted
     assert (next_step(lifted), next_step(pressing)) == expected
 
@@ -53,10 +53,10 @@ def test_every_rejection_gives_a_next_step(rejection):
     assert probabilities(result) == {'cork': 0.25, 'felt': 0.75}
 
 
-def explore(graph, client, meanwhile=lambda: None, **request):
+def explore(graph, client, world, meanwhile=lambda: None, **request):
     """Return the result of an exploration and the status of its goal; `meanwhile` is called in its slide."""
     client.start(**request)
-    graph.until(lambda: client.is_complete() or (client.feedback and client.feedback.state.phase == SLIDE))
+    graph.until(lambda: client.is_complete() or world.phase == SLIDE)
     if not client.is_complete():
         meanwhile()
     graph.until(client.is_complete)
@@ -68,6 +68,7 @@ class World:
 
     def __init__(self):
         self.rejection = E.REJECTION_NONE
+        self.phase = ExplorationState.PHASE_IDLE
         given = [Parameter(name, value=value) for name, value in STILL.items()]
         self._nodes = self._explorer, classifier = ExplorerNode(parameter_overrides=given), Node('classifier')
         self._estimates = classifier.create_publisher(E, 'texture', ESTIMATE_QOS)
@@ -82,6 +83,7 @@ class World:
         self._thread.start()
 
     def _answer(self, state):
+        self.phase = state.phase
         if state.phase == ExplorationState.PHASE_LIFT:
             values = {'exploration_id': state.exploration_id, 'rejection': self.rejection, 'final': True}
             self._estimates.publish(E(label='cork', probabilities=[0.75, 0.25], confidence=0.75, model='m', **values))
@@ -117,21 +119,21 @@ def client(graph):
 
 @pytest.mark.realtime
 def test_every_end_of_an_exploration_reaches_the_client_with_its_next_step(graph, client):
-    aborted, again = GoalStatus.STATUS_ABORTED, Next.EXPLORE_AGAIN
+    aborted, again = GoalStatus.STATUS_ABORTED, Next.RETRY
     ends = (
-        (R.ERROR_UNKNOWN_MOTION, {'motion': 'flight'}, None, aborted, Next.CORRECT_REQUEST),
-        (R.ERROR_INVALID_REQUEST, {**QUICK, 'force_n': 50.0}, None, aborted, Next.CORRECT_REQUEST),
+        (R.ERROR_UNKNOWN_MOTION, {'motion': 'flight'}, None, aborted, Next.FIX_REQUEST),
+        (R.ERROR_INVALID_REQUEST, {**QUICK, 'force_n': 50.0}, None, aborted, Next.FIX_REQUEST),
         (R.ERROR_STOPPED, SLOW, client.stop, aborted, again),
         (R.ERROR_CANCELLED, SLOW, client.cancel, GoalStatus.STATUS_CANCELED, again),
         (R.ERROR_TIMEOUT, {**SLOW, 'timeout': Duration(sec=2)}, None, aborted, again),
     )
     with World() as world:
         for code, request, meanwhile, status, step in ends:
-            result, ended = explore(graph, client, meanwhile or (lambda: None), **request)
+            result, ended = explore(graph, client, world, meanwhile or (lambda: None), **request)
             assert (result.error_code, ended, next_step(result)) == (code, status, step), result.message
         for rejection in (E.REJECTION_NONE, E.REJECTION_NOVEL, E.REJECTION_AMBIGUOUS, E.REJECTION_OUTSIDE_TRAINING):
             world.rejection = rejection
-            result, ended = explore(graph, client, **QUICK)
+            result, ended = explore(graph, client, world, **QUICK)
             assert (result.error_code, ended) == (R.ERROR_NONE, GoalStatus.STATUS_SUCCEEDED), result.message
             assert next_step(result) == REJECTED[Rejection(rejection).name]
             assert probabilities(result) == {'cork': 0.75, 'felt': 0.25}

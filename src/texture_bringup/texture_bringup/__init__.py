@@ -5,13 +5,13 @@
 Data in: arguments of launch files and commands. Data out: running nodes, sentences for people, and exit codes: 0 for
 success, 2 if an argument is wrong or something is missing, 1 for a bad outcome such as an aborted exploration.
 
-```sh
-texture demo
-texture launch emulator surface:=leather      # or: ros2 launch texture_bringup emulator.launch.xml surface:=leather
-texture explore linear_slide --speed 0.05 --distance 0.06
-texture dashboard
-eval "$(register-python-argcomplete texture)" # in ~/.bashrc: completes commands and options (python3-argcomplete)
-```
+.. code-block:: sh
+
+    texture demo
+    texture launch emulator surface:=leather      # or: ros2 launch texture_bringup emulator.launch.xml surface:=leather
+    texture explore linear_slide --speed 0.05 --distance 0.06
+    texture dashboard
+    eval "$(register-python-argcomplete texture)" # in ~/.bashrc: completes commands and options (python3-argcomplete)
 
 Directions are in degrees in commands and on the dashboard, all else in SI units. A task shows its
 progress after 3 s.

@@ -5,13 +5,13 @@
 Data: frozen dataclasses, which are checked when they are made. Times are integers in ns and quantities are SI.
 Nothing reads a clock. Only the module `ros` needs ROS.
 
-```python
-from texture_core.config import find, param
-from texture_core.types import TactileSignal, lost_samples
+.. code-block:: python
 
-lost = lost_samples(batches)  # batches: TactileSignals of one stream, in order
-feature = find({'hjorth': hjorth}, 'hjorth', 'feature')  # the error for a wrong name gives the nearest one
-```
+    from texture_core.config import find, param
+    from texture_core.types import TactileSignal, lost_samples
+
+    lost = lost_samples(batches)  # batches: TactileSignals of one stream, in order
+    feature = find({'hjorth': hjorth}, 'hjorth', 'feature')  # the error for a wrong name gives the nearest one
 
 Limits: a parameter is declared once, as a `param` field; YAML, ROS and the reference read it there.
 """

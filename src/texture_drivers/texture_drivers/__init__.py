@@ -5,16 +5,16 @@
 Data in: the bytes of a device. Data out: `signal` and `signal_static`, fast and slow channels in
 the unit of the sensor, in batches of 5 to 20 ms; every lost sample is counted.
 
-```python
-from texture_drivers.sensor import SensorParams
-from texture_drivers.tsf85 import Tsf85
+.. code-block:: python
 
-sensor = Tsf85(SensorParams(device='auto'))
-sensor.open()
-batches = sensor.read()  # {'signal': [TactileSignal, ...], 'signal_static': [...]}
-```
+    from texture_drivers.sensor import SensorParams
+    from texture_drivers.tsf85 import Tsf85
+
+    sensor = Tsf85(SensorParams(device='auto'))
+    sensor.open()
+    batches = sensor.read()  # {'signal': [TactileSignal, ...], 'signal_static': [...]}
 
 With ROS: `ros2 run texture_drivers sensor --ros-args -p sensor:=tsf85 -p device:=auto`
 
-Limits: no driver has been tested with a real device. Wiring and protocols: [sensors](../../docs/sensors.md).
+Limits: no driver has been tested with a real device. Wiring and protocols: `docs/sensors.md`.
 """

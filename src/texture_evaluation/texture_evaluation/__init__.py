@@ -5,13 +5,13 @@
 Data in: bags of labelled slides and a recipe. Data out: a model, or figures as JSON: accuracy of windows and slides
 over sliding time, calibration error, confusion and latency. Nothing here needs ROS.
 
-```python
-from texture_evaluation.evaluate import evaluate
-from texture_evaluation.train import train_from_bags
+.. code-block:: python
 
-model = train_from_bags('default', bags, slides='1-30', out='models/biotac')
-print(evaluate(model, bags, slides='31-40').as_json()['accuracy_at_s'])
-```
+    from texture_evaluation.evaluate import evaluate
+    from texture_evaluation.train import train_from_bags
 
-Limits: a figure holds for the shift that its split crosses ([generalisation](../../docs/generalisation.md)).
+    model = train_from_bags('default', bags, slides='1-30', out='models/biotac')
+    print(evaluate(model, bags, slides='31-40').as_json()['accuracy_at_s'])
+
+Limits: a figure holds for the shift that its split crosses (`docs/generalisation.md`).
 """

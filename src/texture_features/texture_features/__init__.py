@@ -6,13 +6,13 @@ Data in: `TactileSignal`s of any rate and number of channels, and `ExplorationSt
 Data out: a `FeatureVector` per window, with names such as `signal/mean_log_bands/12/dynamic` (input, feature, value,
 channel). The node and the offline functions give the same numbers to the last bit.
 
-```python
-from texture_features.feature_set import FeatureSet
-from texture_features.windows import cut_recording
+.. code-block:: python
 
-features = FeatureSet.load('default')  # the name or path of a recipe
-vectors = features.extract_many(cut_recording({'signal': batches}, states, features.windows))
-```
+    from texture_features.feature_set import FeatureSet
+    from texture_features.windows import cut_recording
+
+    features = FeatureSet.load('default')  # the name or path of a recipe
+    vectors = features.extract_many(cut_recording({'signal': batches}, states, features.windows))
 
 With ROS: `ros2 run texture_features feature_extractor --ros-args -p recipe:=default`
 

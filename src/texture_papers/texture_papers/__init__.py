@@ -5,10 +5,10 @@
 Data in: bags, or simulated slides. Data out: models, and the figures of each paper next to ours. One module per paper
 (`roberge`, `rispal`, `jamali`, `kaboli`, `hu`); recipes name its parts as `texture_papers.kaboli:SvmLinear`.
 
-```sh
-texture train kaboli-svm BAG -o model      # a recipe by its name, like one of texture_estimation
-texture experiment jamali --out out
-```
+.. code-block:: sh
 
-Limits: the experiments run on simulated scenes ([papers](../../docs/papers.md)). A robot may leave this package out.
+    texture train kaboli-svm BAG -o model      # a recipe by its name, like one of texture_estimation
+    texture experiment jamali --out out
+
+Limits: the experiments run on simulated scenes (`docs/papers.md`). A robot may leave this package out.
 """

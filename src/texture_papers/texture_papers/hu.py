@@ -5,28 +5,28 @@
 What the paper describes and what is done here, element by element:
 
 slide
-    Paper: 25.5 mm/s, 1.5 N, along x and along y, 60 places on each linen (5.1). Time and sampling rate are not
+    :Paper: 25.5 mm/s, 1.5 N, along x and along y, 60 places on each linen (5.1). Time and sampling rate are not
         told, nor whether the finger is lifted between both.
-    Here: Preset `hu-cross`: both in one contact, 3.25 s each; `hu`: one by one. 12 288 points at 4096 Hz are 3 s.
+    :Here: Preset `hu-cross`: both in one contact, 3.25 s each; `hu`: one by one. 12 288 points at 4096 Hz are 3 s.
 spectrum
-    Paper: Fast Fourier transform, 12 288 points (4.1); figure 8 shows power densities.
-    Here: `Spectrum` of magnitudes, nearest to the 39 components. A Hann taper and zeros up to 24 576 samples are
+    :Paper: Fast Fourier transform, 12 288 points (4.1); figure 8 shows power densities.
+    :Here: `Spectrum` of magnitudes, nearest to the 39 components. A Hann taper and zeros up to 24 576 samples are
         ours.
 centring
-    Paper: The mean of each example over its points (eq. 7).
-    Here: The same.
+    :Paper: The mean of each example over its points (eq. 7).
+    :Here: The same.
 components
-    Paper: 99 % of the variance: 39 of the 60 slides of one linen (5.2); the examples as they are are projected (eq.
+    :Paper: 99 % of the variance: 39 of the 60 slides of one linen (5.2); the examples as they are are projected (eq.
         12).
-    Here: Of all training slides, since machines need one basis; the centred examples are projected. `hu-components`
+    :Here: Of all training slides, since machines need one basis; the centred examples are projected. `hu-components`
         has those of one linen.
 x and y
-    Paper: Joined, 78 numbers (5.2).
-    Here: `hu-pca-svm-xy`: inputs `signal@x` and `signal@y`, each with its components, about 150 numbers; the experiment
-        also has 39 + 39.
+    :Paper: Joined, 78 numbers (5.2).
+    :Here: `hu-pca-svm-xy`: inputs `signal@x` and `signal@y`, each with its components, about 150 numbers; the
+        experiment also has 39 + 39.
 machine
-    Paper: RBF, one against one, Max Wins (4.2). Width and penalty are not given.
-    Here: `SvmMaxWins`: those of scikit-learn's `SVC`, with C = 10.
+    :Paper: RBF, one against one, Max Wins (4.2). Width and penalty are not given.
+    :Here: `SvmMaxWins`: those of scikit-learn's `SVC`, with C = 10.
 """
 
 from __future__ import annotations

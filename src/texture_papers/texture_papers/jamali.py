@@ -5,26 +5,26 @@
 What the paper describes and what is done here, element by element:
 
 run
-    Paper: Down to about 1 N, straight at a constant speed, up (V.C). Speed and length are not given.
-    Here: Preset `jamali`: 0.05 m/s for 2 s.
+    :Paper: Down to about 1 N, straight at a constant speed, up (V.C). Speed and length are not given.
+    :Here: Preset `jamali`: 0.05 m/s for 2 s.
 signals
-    Paper: Four PVDF films and four strain gauges at 2.5 kHz, low-pass of 500 Hz (III, V.B).
-    Here: The same: all eight channels.
+    :Paper: Four PVDF films and four strain gauges at 2.5 kHz, low-pass of 500 Hz (III, V.B).
+    :Here: The same: all eight channels.
 contact
-    Paper: Cut by hand, "the entire interval" (IV.A).
-    Here: Steady sliding alone, by the states of the exploration or found in the signal.
+    :Paper: Cut by hand, "the entire interval" (IV.A).
+    :Here: Steady sliding alone, by the states of the exploration or found in the signal.
 peaks
-    Paper: Algorithm 1: equal regions by energy, neighbours joined; their number is not given (IV.A).
-    Here: `RegionPeaks` with 32 regions: the frequency of the largest coefficient of each peak (IV.B).
+    :Paper: Algorithm 1: equal regions by energy, neighbours joined; their number is not given (IV.A).
+    :Here: `RegionPeaks` with 32 regions: the frequency of the largest coefficient of each peak (IV.B).
 learner
-    Paper: Naive Bayes of Weka (IV.B, VI).
-    Here: scikit-learn's `GaussianNB`: normal distributions of standardised features.
+    :Paper: Naive Bayes of Weka (IV.B, VI).
+    :Here: scikit-learn's `GaussianNB`: normal distributions of standardised features.
 baseline
-    Paper: "Average amplitude", "averaging the signals of each sensor" in the middle third (VI).
-    Here: `MeanAmplitude`, the mean of |s|, the reading nearest to the words and to 65.75 %.
+    :Paper: "Average amplitude", "averaging the signals of each sensor" in the middle third (VI).
+    :Here: `MeanAmplitude`, the mean of `|s|`, the reading nearest to the words and to 65.75 %.
 future work
-    Paper: Short-term Fourier and wavelet transform, symbols (VII), without figures.
-    Here: Left out.
+    :Paper: Short-term Fourier and wavelet transform, symbols (VII), without figures.
+    :Here: Left out.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ def _first_step(peak: NDArray[np.intp], rank: NDArray[np.intp], count: int) -> A
 
 @dataclass(frozen=True)
 class MeanAmplitude:
-    """Mean of |s| of each channel, in its unit: the plainest measure of how it vibrates.
+    """Mean of `|s|` of each channel, in its unit: the plainest measure of how it vibrates.
 
     The source says "average amplitude of the signal over a fixed window" and "averaging the signals of each sensor".
 

@@ -5,41 +5,41 @@
 What the paper describes and what is done here, element by element:
 
 motion
-    Paper: Index and middle finger slide for 2 s while the others hold, to train; thumb and index finger, to test
+    :Paper: Index and middle finger slide for 2 s while the others hold, to train; thumb and index finger, to test
         (III.B). Speed and force are not given.
-    Here: Preset `kaboli`: 2.1 s at 0.008 m/s and 1 N with the finger sets `kaboli-train`, `kaboli-test`; the
+    :Here: Preset `kaboli`: 2.1 s at 0.008 m/s and 1 N with the finger sets `kaboli-train`, `kaboli-test`; the
         experiment 2 s at 0.02 m/s.
 signals
-    Paper: PAC at 2 kHz, 19 electrodes at 50 Hz (III.C).
-    Here: PAC at 2.2 kHz, 19 electrodes at 100 Hz, as the board sends them.
+    :Paper: PAC at 2 kHz, 19 electrodes at 50 Hz (III.C).
+    :Here: PAC at 2.2 kHz, 19 electrodes at 100 Hz, as the board sends them.
 descriptors
-    Paper: Activity, mobility, complexity of PAC and, in the mean, of the electrodes (eq. 1 to 3, 6).
-    Here: The same: `hjorth`, `MeanHjorth`.
+    :Paper: Activity, mobility, complexity of PAC and, in the mean, of the electrodes (eq. 1 to 3, 6).
+    :Here: The same: `hjorth`, `MeanHjorth`.
 correlations
-    Paper: Pearson and Spearman of PAC with each electrode, in the mean (eq. 4 to 6). How the rates are matched is
+    :Paper: Pearson and Spearman of PAC with each electrode, in the mean (eq. 4 to 6). How the rates are matched is
         not told.
-    Here: `Correlation`, PAC averaged to the rate of the electrodes.
+    :Here: `Correlation`, PAC averaged to the rate of the electrodes.
 fingers
-    Paper: Two, 16 numbers (III.E).
-    Here: `…-two-fingers`; the other recipes are of one finger.
+    :Paper: Two, 16 numbers (III.E).
+    :Here: `…-two-fingers`; the other recipes are of one finger.
 SVM
-    Paper: Linear, C by 5-fold cross-validation, 10 times, 20 values (V.A).
-    Here: The same; the range of C is ours, 0.001 to 1000.
+    :Paper: Linear, C by 5-fold cross-validation, 10 times, 20 values (V.A).
+    :Here: The same; the range of C is ours, 0.001 to 1000.
 online learning
-    Paper: PA-I of Crammer et al., C = 1, 20 objects (IV, V.B). Form for many classes and number of passes are not
+    :Paper: PA-I of Crammer et al., C = 1, 20 objects (IV, V.B). Form for many classes and number of passes are not
         told.
-    Here: `PassiveAggressive`, all planes together, one pass; `passes` gives more. `texture add` updates the planes
+    :Here: `PassiveAggressive`, all planes together, one pass; `passes` gives more. `texture add` updates the planes
         live.
 clusters
-    Paper: EM on "the entire unsupervised data set", classes by majority (V.C). Shape of the clusters is not given.
-    Here: `EmMixture`, features independent within a cluster; in the experiment of all slides, whose labels name the
+    :Paper: EM on "the entire unsupervised data set", classes by majority (V.C). Shape of the clusters is not given.
+    :Here: `EmMixture`, features independent within a cluster; in the experiment of all slides, whose labels name the
         clusters; by the recipe of the training slides.
 objects
-    Paper: Ten balls and ten of various shapes; "regardless of object shape" (VI).
-    Here: Scene `kaboli`: flat, one skin; scene `kaboli_shapes`: curved, fingers that differ. Sizes are guesses.
+    :Paper: Ten balls and ten of various shapes; "regardless of object shape" (VI).
+    :Here: Scene `kaboli`: flat, one skin; scene `kaboli_shapes`: curved, fingers that differ. Sizes are guesses.
 random movements
-    Paper: Future work (VI).
-    Here: None.
+    :Paper: Future work (VI).
+    :Here: None.
 """
 
 from __future__ import annotations
@@ -275,7 +275,7 @@ class PassiveAggressive:
 def move_true_and_rival(planes: Array, standard: Array, code: int, c: float) -> None:
     """Move the planes of the true label and of its strongest rival until the true one scores higher by 1.
 
-    Of all planes for which that holds the nearest are taken: tau = min(c, loss / (2 |x|²)) is added to the one and
+    Of all planes for which that holds the nearest are taken: `tau = min(c, loss / (2 |x|²))` is added to the one and
     subtracted from the other, times x. `planes` are (n_labels, n_features + 1), the bias last, and change in place.
 
     Source: Crammer et al. 2006, section 8.

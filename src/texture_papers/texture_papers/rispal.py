@@ -5,26 +5,26 @@
 What the paper describes and what is done here, element by element:
 
 slide
-    Paper: 0.15 m/s, 2.5 N, against the ridges, 700 ms, of which 500 are transformed (IV.B, V.A).
-    Here: The same in preset and experiment.
+    :Paper: 0.15 m/s, 2.5 N, against the ridges, 700 ms, of which 500 are transformed (IV.B, V.A).
+    :Here: The same in preset and experiment.
 features
-    Paper: As in the paper on textures, without speed and force (IV.D).
-    Here: The same.
+    :Paper: As in the paper on textures, without speed and force (IV.D).
+    :Here: The same.
 hidden layer
-    Paper: "The transfer function in the hidden layer is linear" (IV.C).
-    Here: The same.
+    :Paper: "The transfer function in the hidden layer is linear" (IV.C).
+    :Here: The same.
 ANN 1
-    Paper: One output, a number from 1 to 5 (IV.C).
-    Here: The output, cut off at 1 and 5.
+    :Paper: One output, a number from 1 to 5 (IV.C).
+    :Here: The output, cut off at 1 and 5.
 ANN 5, SVM 5
-    Paper: A boolean for each grade; the mean of those that fire, 0 if none does (IV.C).
-    Here: The same, but none firing is no grade; figures count it separately, and as 0.
+    :Paper: A boolean for each grade; the mean of those that fire, 0 if none does (IV.C).
+    :Here: The same, but none firing is no grade; figures count it separately, and as 0.
 people
-    Paper: 30 people, 25 textures, 15 to train and 10 to test, whole grades (III, table I).
-    Here: The same: `ets_roughness.csv`.
+    :Paper: 30 people, 25 textures, 15 to train and 10 to test, whole grades (III, table I).
+    :Here: The same: `ets_roughness.csv`.
 search
-    Paper: 20 individuals, 30 generations on the 15 textures (IV.D).
-    Here: `texture experiment roughness --tune`: the same size, 40 of the 200 slides of each texture, 20 halves.
+    :Paper: 20 individuals, 30 generations on the 15 textures (IV.D).
+    :Here: `texture experiment roughness --tune`: the same size, 40 of the 200 slides of each texture, 20 halves.
 """
 
 from __future__ import annotations

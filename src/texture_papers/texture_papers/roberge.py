@@ -5,47 +5,47 @@
 What the paper describes and what is done here, element by element:
 
 slide
-    Paper: 500 ms at 0.10, 0.15, 0.20 m/s and 1, 2.5, 5 N; ten textures: 10 cm at 0.125 m/s and 2 N (IV.A, V.A).
-    Here: The same in the presets, 50 ms longer, so that a late arm also covers it.
+    :Paper: 500 ms at 0.10, 0.15, 0.20 m/s and 1, 2.5, 5 N; ten textures: 10 cm at 0.125 m/s and 2 N (IV.A, V.A).
+    :Here: The same in the presets, 50 ms longer, so that a late arm also covers it.
 transform
-    Paper: The signal less its mean, 1024 values from 0 to 500 Hz (III.B).
-    Here: The same: 2048 points at 1 kHz.
+    :Paper: The signal less its mean, 1024 values from 0 to 500 Hz (III.B).
+    :Here: The same: 2048 points at 1 kHz.
 peaks
-    Paper: Maxima with a least gap, 2 to 15, their frequency and amplitude, ranked by either (III.B, IV).
-    Here: The same: `SpectralPeaks`.
+    :Paper: Maxima with a least gap, 2 to 15, their frequency and amplitude, ranked by either (III.B, IV).
+    :Here: The same: `SpectralPeaks`.
 integral, length
-    Paper: Equations 1 and 2.
-    Here: The same: `SignalEnergy`, `ArcLength`.
+    :Paper: Equations 1 and 2.
+    :Here: The same: `SignalEnergy`, `ArcLength`.
 network
-    Paper: Sigmoid hidden layer, linear output, rounded, one for each pair (III.C). Its training is not given.
-    Here: `AnnPairs`, trained as by MATLAB's default.
+    :Paper: Sigmoid hidden layer, linear output, rounded, one for each pair (III.C). Its training is not given.
+    :Here: `AnnPairs`, trained as by MATLAB's default.
 machine
-    Paper: One for each pair, with box constraint and kernel scale of MATLAB (III.C, IV). Its kernel is not given.
-    Here: `SvmPairs` with the RBF kernel.
+    :Paper: One for each pair, with box constraint and kernel scale of MATLAB (III.C, IV). Its kernel is not given.
+    :Here: `SvmPairs` with the RBF kernel.
 decision
-    Paper: Most pairs; a tie is unclassified (III.C).
-    Here: The same: `pairs_won`.
+    :Paper: Most pairs; a tie is unclassified (III.C).
+    :Here: The same: `pairs_won`.
 vote
-    Paper: Five parts of one scan of 500 ms, at least three equal (III.C, IV.B.1).
-    Here: The newest five windows of 0.1 s; on a longer slide every 0.5 s is a separate decision.
+    :Paper: Five parts of one scan of 500 ms, at least three equal (III.C, IV.B.1).
+    :Here: The newest five windows of 0.1 s; on a longer slide every 0.5 s is a separate decision.
 parts of a circle
-    Paper: 1 to 9, most votes; 7 or 9 in almost all cases (IV, IV.B.2).
-    Here: 7 of 70 ms for all pairs.
+    :Paper: 1 to 9, most votes; 7 or 9 in almost all cases (IV, IV.B.2).
+    :Here: 7 of 70 ms for all pairs.
 search
-    Paper: 20 individuals, 30 generations, the mean of learning and test over 20 halves (IV); from there 10 and 10
+    :Paper: 20 individuals, 30 generations, the mean of learning and test over 20 halves (IV); from there 10 and 10
         for the vote, 13 and 10 for ten textures. Test slides are part of the fitness.
-    Here: `texture experiment NAME --tune`: the same for each pair, on the training half alone; 10 halves for the vote.
+    :Here: `texture experiment NAME --tune`: the same for each pair, on the training half alone; 10 halves for the vote.
         Networks 10 and 5 with 4 halves, for the vote the best 10 of these with 2. Test slides are never part.
 variables
-    Paper: A set for each pair (III.C), not printed.
-    Here: `…-pairs`: those found for the first seed of the experiment, in the size that the file names. The other
+    :Paper: A set for each pair (III.C), not printed.
+    :Here: `…-pairs`: those found for the first seed of the experiment, in the size that the file names. The other
         recipes have one set for all pairs.
 standardisation
-    Paper: Not given.
-    Here: Features have zero mean and unit variance.
+    :Paper: Not given.
+    :Here: Features have zero mean and unit variance.
 friction
-    Paper: The next question (VI).
-    Here: The recipe `friction-svm`, which needs the arm `ur` or `ros_controllers`; without figures.
+    :Paper: The next question (VI).
+    :Here: The recipe `friction-svm`, which needs the arm `ur` or `ros_controllers`; without figures.
 """
 
 from __future__ import annotations
@@ -420,8 +420,8 @@ def pairs_of_machine(parameters: Mapping[str, Any]) -> PairsPredictor:
 class SvmPairs:
     """RBF machines for all pairs with one box constraint and kernel scale; most pairs won.
 
-    A pipeline of scikit-learn: `StandardScaler`, which is ours, and `SVC` with exp(-|x - s|² / kernel_scale²), MATLAB's
-    sense of the scale: gamma = 1 / kernel_scale².
+    A pipeline of scikit-learn: `StandardScaler`, which is ours, and `SVC` with `exp(-|x - s|² / kernel_scale²)`,
+    MATLAB's sense of the scale: gamma = 1 / kernel_scale².
 
     Source: Roberge et al., "Textures recognition through tactile exploration", sections III.C and IV.
     """

@@ -6,13 +6,13 @@ Data in: MCAP bags, or tables, arrays, sound and data sets of others. Data out: 
 their signals and conditions. A robot that only records needs this package, `texture_drivers`, `texture_core` and
 `texture_msgs`, and neither scikit-learn nor matplotlib.
 
-```python
-from texture_recordings.dataset import SlideDataset
-from texture_recordings.public_sets import import_biotac20
+.. code-block:: python
 
-dataset = SlideDataset.from_bags(import_biotac20('recordings/biotac20', 'bags'), '1-30')
-samples, labels = dataset.to_numpy('signal')  # one array (n_samples, n_channels) per slide
-```
+    from texture_recordings.dataset import SlideDataset
+    from texture_recordings.public_sets import import_biotac20
+
+    dataset = SlideDataset.from_bags(import_biotac20('recordings/biotac20', 'bags'), '1-30')
+    samples, labels = dataset.to_numpy('signal')  # one array (n_samples, n_channels) per slide
 
 With ROS: `texture record my_bag`, `texture replay my_bag --rate 2`
 

@@ -354,15 +354,19 @@ def is_cut_off(path: Path) -> bool:
 
 
 def find_bags(paths: Iterable[str | Path]) -> list[Path]:
-    """Return the bags among `paths`, each a bag or a folder of bags, in the order given and by name."""
-    found: list[Path] = []
-    for path in map(Path, paths):
-        inside = [path] if is_bag(path) else sorted(filter(is_bag, path.glob('*')))
-        if not inside:
-            raise InvalidData(_no_bag(path))
-        found += inside
+    """Return the bags of all `paths`, in the order given."""
+    found = [bag for path in paths for bag in bags_in(path)]
     if not found:
         raise InvalidData('no bag was given; name one or more bags, or a folder of bags')
+    return found
+
+
+def bags_in(path: str | Path) -> list[Path]:
+    """Return the bag at `path`, or those in the folder there, by name."""
+    path = Path(path)
+    found = [path] if is_bag(path) else sorted(filter(is_bag, path.glob('*')))
+    if not found:
+        raise InvalidData(_no_bag(path))
     return found
 
 

@@ -115,14 +115,14 @@ def _configure_info(parser: argparse.ArgumentParser) -> None:
 
 
 def _info(options: argparse.Namespace) -> int:
-    from texture_recordings.bags import find_bags
+    from texture_recordings.bags import bags_in
 
     path = Path(options.path)
     # A model is one of two files with the same name; everything else is read as a bag, whose errors are reported.
     if not path.is_dir() and (path.suffix in ('.npz', '.json') or path.with_name(f'{path.name}.npz').is_file()):
         print('\n'.join(_model_lines(path)))
         return 0
-    for bag in find_bags([path]):
+    for bag in bags_in(path):
         print(f'{bag}\n{table(_bag_rows(bag, options.namespace))}')
     return 0
 

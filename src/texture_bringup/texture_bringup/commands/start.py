@@ -49,13 +49,13 @@ LOOKED_AT = {
     'classifier': ('texture_estimation.model', 'load_model', 'model'),
     'roughness_estimator': ('texture_estimation.roughness', 'load_roughness_model', 'model'),
     'feature_extractor': ('texture_features.feature_set', 'FeatureSet.load', 'recipe'),
-    'replay': ('texture_recordings.bags', 'find_bags', 'bag'),
+    'replay': ('texture_recordings.bags', 'bags_in', 'bag'),
 }
 
 
 def _look_at(module: str, load: str, value: str, *surfaces: str) -> None:
     """Load what a node would load, and the surfaces of a scene; TextureError if they cannot be."""
-    loaded = attrgetter(load)(import_module(module))([value] if load == 'find_bags' else value)
+    loaded = attrgetter(load)(import_module(module))(value)
     for surface in surfaces:
         loaded.surface(surface)
 

@@ -304,7 +304,7 @@ class TemporalVariation(Feature):
     """
 
     def __call__(self, windows: WindowBatch) -> Array:
-        """Return log(mean |s(t + lag) - s(t)|)."""
+        """Return log(mean `|s(t + lag) - s(t)|`)."""
         rows = windows.rows
         lag = min(max(1, round(LAG_S * windows.rate_hz)), rows.shape[-1] - 1)
         steps = np.abs(rows[..., lag:] - rows[..., : rows.shape[-1] - lag])

@@ -22,7 +22,7 @@ from texture_core.config import param
 from texture_core.errors import DeviceError, InvalidData, InvalidParameter, TextureError
 from texture_core.ros import declare, run, to_stamp
 from texture_core.types import NANOSECONDS
-from texture_recordings.bags import RawMessage, find_bags, read_named, short_name, topics_in
+from texture_recordings.bags import RawMessage, bags_in, read_named, short_name, topics_in
 from texture_recordings.ros import TOPICS
 from texture_recordings.slides import find_slides
 
@@ -116,7 +116,7 @@ class ReplayNode(Node):
         A bag that cannot be read is refused here, before any thread runs.
         """
         namespace = self._params.from_namespace or None
-        bags = find_bags([self._params.bag])
+        bags = bags_in(self._params.bag)
         inside = {name for bag in bags for name in topics_in(bag, namespace) if short_name(name) in INPUTS}
         # With several fingers there is no topic of a single one.
         names = {'exploration', *inside} if any('/' in name for name in inside) else set(INPUTS)
