@@ -97,7 +97,8 @@ def emulator():
 
 @contextlib.contextmanager
 def connected(emulator, **values):
-    arm = UrArm(UrArmParams(ip=emulator.ip, **values))
+    patient = {'connect_timeout_s': 60.0, **values}  # with a busy machine, which starts the worker late
+    arm = UrArm(UrArmParams(ip=emulator.ip, **patient))
     try:
         arm.connect()
         yield arm
@@ -274,6 +275,19 @@ def test_a_worker_that_hangs_is_killed_when_the_arm_is_closed(arm, emulator):
     arm.close()
     assert time.monotonic() - begin_s < 5.0
     assert not Path(f'/proc/{worker}').exists()
+
+
+def test_a_worker_that_does_not_read_is_silent_and_a_stop_that_it_cannot_get_is_named(arm):
+    worker = arm._link.process.pid
+    os.kill(worker, signal.SIGSTOP)
+    try:
+        wait_for(lambda: time.monotonic_ns() - arm.state().time_ns > 200_000_000)
+        for _ in range(3000):  # more than the line holds
+            arm.command(SLIDING)
+        with pytest.raises(DeviceError, match='does not read a stop'):
+            arm.stop()
+    finally:
+        os.kill(worker, signal.SIGCONT)
 
 
 def test_when_the_parent_is_killed_the_arm_stops_and_the_worker_ends(emulator, record_property):
