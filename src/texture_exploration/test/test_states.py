@@ -11,8 +11,8 @@ import pytest
 from table_arm import TableArmParams
 
 from texture_core.types import ExplorationRequest, Phase
-from texture_exploration import force_control, guards, lift_first, safety, stages, touch, watches
-from texture_exploration.arms import arm
+from texture_exploration import force_control, guards, lift_first, safety, stages, surface, touch, watches
+from texture_exploration.arms import arm, ros_controllers, tool_state
 from texture_exploration.explorer import PERIOD_S
 from texture_exploration.motions import MOTIONS
 
@@ -142,6 +142,10 @@ def test_the_sentences_of_the_pages_hold_the_limits_of_the_code():
             f'below {100 * touching.lost_force_fraction:g} % of the requested force',
             f'under {100 * touching.stall_speed_fraction:g} % of the path',
             f'mean force off by {100 * mean:g} %, speed by {100 * speed:g} %, peak by {100 * peak:g} %',
+            f'after {1e3 * tool_state.FOLLOW_M:g} mm commanded, {1e-9 * tool_state.FOLLOW_NS:g} s: lift',
+            f'motion after {1e-9 * ros_controllers.RESTS_WITHIN_NS:g} s is a fault',
+            f'guard, {1e3 * tool_state.HEARTBEAT_S:g} ms without heartbeat',
+            f'touches too light, before zeroing, within {1e3 * surface.NARROWEST_M:g} mm of another',
             f'outside {safety.RANGES["speed_m_s"][0]:g} to {limits.max_speed_m_s:g} m/s, {limits.min_force_n:g} to '
             f'{limits.max_force_n:g} N',
         ],
