@@ -44,7 +44,7 @@ def controller():
 
 @contextmanager
 def ur(controller):
-    yield controller, UrArm(UrArmParams(ip=UR.ip)), FIRM
+    yield controller, UrArm(UrArmParams(ip=UR.ip, connect_timeout_s=60.0)), FIRM
 
 
 @contextmanager

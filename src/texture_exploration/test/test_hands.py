@@ -5,6 +5,7 @@
 They hold and slide; whatever ends the command of motors ends their torque, and what is wrong with them is named.
 """
 
+import contextlib
 import math
 import os
 import re
@@ -22,9 +23,9 @@ from texture_core.errors import CommandRefused, DeviceError, InvalidParameter, U
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms import hand as hands
 from texture_exploration.arms.arm import ArmCommand
-from texture_exploration.arms.dynamixel import DynamixelBus, DynamixelFinger, DynamixelHand
+from texture_exploration.arms.dynamixel import DynamixelBus
 from texture_exploration.arms.hand import load_profile, read_profile
-from texture_exploration.arms.in_hand import InHandArm, InHandParams
+from texture_exploration.arms.in_hand import DynamixelFinger, InHandArm, InHandParams
 from texture_exploration.explorer import Explorer
 from texture_exploration.safety import SafetyLimits
 from texture_exploration.touch import TouchParams
@@ -52,11 +53,10 @@ REBOOT_IT = (
 THUMB = LEAP.fingers['thumb']['press'].id
 PARENT = """
 import sys, time
-from texture_exploration.arms.dynamixel import DynamixelHand
+from texture_exploration.arms.in_hand import InHandArm, InHandParams
 
-hand = DynamixelHand('leap', sys.argv[1])
+hand = InHandArm(InHandParams(device=sys.argv[1], grip_timeout_s=20.0))
 hand.connect()
-hand.grip({'thumb': 2.0})
 print('connected', flush=True)
 time.sleep(600)
 """
@@ -100,7 +100,7 @@ def bus(tmp_path):
 
 @pytest.fixture
 def hand(bus):
-    made = DynamixelHand('leap', str(bus.port.link))
+    made = arm_on(bus)
     yield made
     made.close()
 
@@ -176,9 +176,7 @@ def test_no_more_current_is_asked_for_than_a_motor_takes(bus, hand):
     hand.connect()
     until(lambda: register(bus, 1, GOAL_CURRENT) == 100)  # and not 350, of the profile
     with pytest.raises(CommandRefused, match=r'the Current Limit of its motor allows 0\.574 N'):  # 0.1 A · 0.517 / 0.09
-        hand.command(['index'], ArmCommand(force_n=1.0))
-    with pytest.raises(CommandRefused, match='the Current Limit of its motor'):
-        hand.grip({'index': 1.0})
+        hand.command(ArmCommand(force_n=1.0))
     until(lambda: fault_of(hand) == '')
     hand.close()
     bus.motors.write(THUMB, 38, (100).to_bytes(2, 'little'))
@@ -190,8 +188,13 @@ def test_no_more_current_is_asked_for_than_a_motor_takes(bus, hand):
 def test_a_goal_that_a_motor_refuses_is_a_named_fault(bus, hand):
     hand.connect()
     bus.motors.tables[1][38:40] = (50).to_bytes(2, 'little')  # lowered behind the program's back
-    hand.grip({'index': 1.0})
-    until(lambda: "motor 1 ('press' of index) did not accept 'goal_current'" in fault_of(hand))
+
+    def refused():
+        with contextlib.suppress(DeviceError):  # of a hand that was released
+            hand.command(ArmCommand(force_n=1.0))
+        return "motor 1 ('press' of index) did not accept 'goal_current'" in fault_of(hand)
+
+    until(refused)
     assert 'exceeds the limit' in fault_of(hand)
     until(lambda: torque_is_off(bus))
 
@@ -259,9 +262,9 @@ def test_a_motor_that_was_reset_is_named_and_driven_again_after_a_new_connection
 
 def test_a_second_program_is_refused_before_it_opens_the_line_and_empties_its_buffer(bus, hand, monkeypatch):
     hand.connect()
-    second, opened = DynamixelHand('leap', str(bus.port.link)), []
+    second, opened = arm_on(bus), []
     monkeypatch.setattr('dynamixel_sdk.PortHandler.openPort', lambda port: opened.append(port) or True)
-    for ask in (second.connect, second.reboot):
+    for ask in (second.connect, second.recover):
         with pytest.raises(DeviceError, match='no other program has it open'):
             ask()
     assert not opened
@@ -332,12 +335,10 @@ def test_a_hand_refuses_what_exceeds_its_limits_and_goes_on(bus, hand):
     hand.connect()
     for force_n in (math.nan, math.inf, -1.0, 60.0):
         with pytest.raises(CommandRefused, match='was refused and the arm stopped: the force is'):
-            hand.command(['index'], ArmCommand(force_n=force_n))
-        with pytest.raises(CommandRefused, match='was refused and the arm stopped: the force is'):
-            hand.grip({'index': force_n})
+            hand.command(ArmCommand(force_n=force_n))
     for command in (ArmCommand(tangential_m_s=(math.nan, 0.0)), ArmCommand(normal_m_s=-5.0)):
         with pytest.raises(CommandRefused, match='was refused and the arm stopped: the speed'):
-            hand.command(['index'], command)
+            hand.command(command)
     before = hand.state().time_ns
     until(lambda: hand.state().time_ns > before and hand.state().fault == '')
 
@@ -373,7 +374,7 @@ def test_a_hand_holds_while_two_fingers_slide_and_lets_the_object_go_when_closed
 
     def note(state):
         if state.phase is Phase.SLIDE:
-            forces.append({name: tip.force_n for name, tip in arm.hand.state().fingers.items()})
+            forces.append({name: bus.motors.forces_n[joints['press'].id] for name, joints in LEAP.fingers.items()})
 
     # The emulated bus makes up for up to 0.1 s that a busy machine lost: seen over 30 ms, up to 4.3 times as fast.
     touch = TouchParams(speed_tolerance=0.3, force_tolerance=0.2, peak_speed_fraction=3.4)
@@ -412,13 +413,13 @@ def test_a_late_answer_to_an_earlier_question_is_not_taken_for_a_measurement(bus
 
 
 def test_a_missing_motor_is_named_and_the_others_move_on(bus):
-    hand = DynamixelHand('leap', str(bus.port.link))
+    hand = arm_on(bus)
     hand.connect()
     bus.motors.absent = {5}
     until(lambda: hand.state().fault == "motor 5 ('press' of middle) does not answer")
     before = hand.state().time_ns
-    hand.command(['index'], ArmCommand(tangential_m_s=(0.02, 0.0)))
-    until(lambda: hand.state().time_ns > before and hand.state().fingers['index'].position[0] > 0.0005)
+    hand.command(ArmCommand(tangential_m_s=(0.02, 0.0)))
+    until(lambda: hand.state().time_ns > before and hand.state().position[0] > 0.0005)
     bus.motors.absent = set()
     hand.connect()
     assert hand.state().fault == ''
@@ -435,11 +436,11 @@ def test_a_motor_that_reports_an_error_is_named_and_the_others_hold(bus, hand):
 def test_a_hand_of_another_model_or_without_power_is_reported(bus, monkeypatch):
     monkeypatch.setattr('texture_exploration.arms.dynamixel.TRIES', 2)
     with pytest.raises(DeviceError, match=r"is of model 1240 .*; the profile 'xm430' is for"):
-        DynamixelHand('xm430', str(bus.port.link)).connect()
+        arm_on(bus, profile='xm430').connect()
     assert torque_is_off(bus)
     bus.motors.absent = set(LEAP.ids)
     with pytest.raises(DeviceError, match='no motor answers'):
-        DynamixelHand('leap', str(bus.port.link)).connect()
+        arm_on(bus).connect()
 
 
 def test_without_an_object_there_is_nothing_to_hold(tmp_path):

@@ -2,15 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """After a fault the finger is lifted until nothing touches it, on every arm, before a motion begins."""
 
+import math
 from dataclasses import replace
 
 import pytest
 
+from texture_core.errors import DeviceError, MotionRefused
 from texture_core.types import ExplorationRequest, Phase
-from texture_exploration.arms.arm import ArmState
-from texture_exploration.lift_first import CalmDown, Detour
+from texture_exploration.arms.arm import ArmCommand, ArmState
+from texture_exploration.lift_first import CalmDown, Detour, Rise
 from texture_exploration.motions import MOTIONS
 from texture_exploration.safety import SafetyLimits
+from texture_exploration.stages import SettleForceStage
 from texture_exploration.touch import TouchParams
 
 TOUCH = TouchParams()
@@ -157,3 +160,55 @@ def test_a_contact_that_grows_while_the_finger_stands_still_forbids_the_next_ris
 def test_a_sensor_that_is_zeroed_before_the_arm_says_so_is_no_contact():
     """A controller may acknowledge its zeroing 0.4 s late: the offset of 1.5 N is gone by then."""
     assert rested(lambda seconds: 1.5 if seconds < 0.1 else 0.0).normal_m_s > 0.0
+
+
+@pytest.mark.parametrize('bad', [{'force_n': math.nan}, {'force_n': 1e308}, {'position': (0.0, 0.0, math.nan)}])
+def test_a_lift_on_request_ends_at_the_first_number_that_cannot_be_meant(explorer, monkeypatch, bad):
+    arm, states = explorer.arm, []
+    state, (_, _, start_m) = arm.state, arm.state().position
+
+    def spoiled():
+        states.append(state())
+        return replace(states[-1], **bad) if len(states) > 20 else states[-1]
+
+    monkeypatch.setattr(arm, 'state', spoiled)
+    with pytest.raises((DeviceError, MotionRefused), match=r'the arm reports a (force|place)'):
+        explorer.lift()
+    monkeypatch.undo()
+    assert arm.state().position[2] < start_m + 0.001
+    assert not explorer.lifted
+
+
+@pytest.mark.parametrize('bad', [{'force_n': math.nan}, {'along_n': (0.0, math.inf)}, {'velocity': (math.nan,) * 3}])
+def test_an_arm_whose_numbers_cannot_be_meant_gets_no_request(explorer, monkeypatch, bad):
+    state = explorer.arm.state
+    monkeypatch.setattr(explorer.arm, 'state', lambda: replace(state(), **bad))
+    assert 'the arm reports a' in explorer.fault()
+
+
+def test_from_a_zero_that_is_no_number_nothing_rises():
+    stage = Rise(1.0, TOUCH, SafetyLimits(), zero_n=(math.nan, 0.0, 0.0))
+    with pytest.raises(Detour, match='the force changed by more than'):
+        for tick in range(20):
+            state = ArmState(tick * 10_000_000, (0.0, 0.0, 0.01), (0.0, 0.0, 0.0), 0.0)
+            if not tick:
+                stage.begin(state.time_ns, state)
+            stage.step(state.time_ns, state)
+
+
+def test_a_state_that_stays_old_is_no_rest():
+    """The arm may move while a busy machine gets no new state of it: a probe would be taken for a wrong frame."""
+    stage, old = Rise(1.0, TOUCH, SafetyLimits()), ArmState(0, (0.0, 0.0, 0.01), (0.0, 0.0, 0.0), 0.0)
+    stage.begin(0, old)
+    assert {stage.step(tick * 10_000_000, old) for tick in range(13)} == {ArmCommand()}
+    moved = replace(old, time_ns=130_000_000, position=(0.008, 0.0, 0.01))
+    assert stage.step(130_000_000, moved) == ArmCommand()
+    rested = [stage.step(ns, replace(moved, time_ns=ns)) for ns in range(140_000_000, 210_000_000, 10_000_000)]
+    assert rested[-1].normal_m_s > 0.0
+
+
+def test_a_force_that_stays_old_has_not_settled():
+    stage, old = SettleForceStage(1.0, TOUCH, SafetyLimits()), ArmState(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0)
+    stage.begin(0, old)
+    assert None not in [stage.step(tick * 10_000_000, old) for tick in range(13)]
+    assert stage.step(130_000_000, replace(old, time_ns=130_000_000)) is None

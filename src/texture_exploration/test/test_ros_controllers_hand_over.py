@@ -50,6 +50,7 @@ def graph():
 
 
 TOPICS = ('/twist', 'base', '/pose')
+SENDER = '010f5d3b0a7c41e200000000'  # the first 12 bytes of a GUID
 
 
 def test_a_guard_in_the_namespace_commands_zero_velocity_once_nobody_speaks_for_the_arm(graph):
@@ -89,14 +90,14 @@ class Line:
 
 def test_a_guard_may_be_held_up_for_1_5_s_and_an_answer_that_cannot_be_read_is_no_sign_of_life(monkeypatch):
     line = Line(monkeypatch)
-    line.answers += [b'1 abcdef', b'shared memory port 7413 is taken']
+    line.answers += [f'1 {SENDER}'.encode(), b'7413 is taken by another process', b'2', SENDER.encode() + b' 1']
     assert line.guard.fault() == ''
-    line.answers += [b'\xff\xfe', b'nothing']
+    line.answers += [b'\xff\xfe', b'1 ', b'9' * 4096, f'1 {SENDER} 2'.encode()]
     line.now_s += 1.2
     assert line.guard.fault() == ''
     line.now_s += 0.4
-    assert re.search(r'is silent for 1\.6 s; 3 of its answers could not be read', line.guard.fault())
-    assert (line.guard.reached, line.guard.participant, line.guard.garbled) == (1, 'abcdef', 3)
+    assert re.search(r'is silent for 1\.6 s; 7 of its answers could not be read', line.guard.fault())
+    assert (line.guard.reached, line.guard.participant, line.guard.garbled) == (1, SENDER, 7)
 
 
 def test_a_guard_whose_explorer_has_ended_commands_zero_until_the_pose_shows_rest():
@@ -114,6 +115,23 @@ def test_a_guard_whose_explorer_has_ended_commands_zero_until_the_pose_shows_res
         guard_process.guarded(line, lambda: zeros.append(len(poses)), take_pose, lambda: None)
     assert len(zeros) >= rests_after
     assert poses[-1] == pytest.approx(0.001 * rests_after)
+
+
+@pytest.mark.parametrize(('sent', 'zeros_sent'), [(b'm', True), (b'r', False), (b'', False), (b'7', True)])
+def test_only_an_arm_that_is_said_to_rest_needs_no_zero_velocity_when_nobody_speaks_for_it(sent, zeros_sent):
+    ours, line = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    zeros = []
+
+    def answer():
+        if time.monotonic() - begin_s > 0.3:
+            ours.send(guard_process.DONE)
+
+    with ours, line:
+        if sent:
+            ours.send(sent)
+        begin_s = time.monotonic()
+        guard_process.guarded(line, lambda: zeros.append(1), lambda rest: None, answer)
+    assert bool(zeros) is zeros_sent
 
 
 @pytest.mark.parametrize(('offered', 'started_by'), [(True, guard_process.SCOPE), (False, ())])

@@ -33,6 +33,7 @@ PATIENT = RosControllersParams(
     deadman_s=1.0,
     max_stiffness_n_m=2000.0,
     max_impact_n=0.3,  # of 1 N wanted: more would overshoot at once
+    loop_delay_s=0.1,  # with less the force overshoots next to two busy processes, and is named before the slide
     accept_no_timeout=True,
     accept_shared_group=True,
 )
@@ -118,7 +119,8 @@ def test_a_second_explorer_is_refused_and_does_not_disturb_the_first(controller,
     with ThreadPoolExecutor() as pool:
         first.connect()
         refused = []
-        exploration, _ = explored(first, lambda: refused.append(pool.submit(second.connect)))
+        exploration, since_ns = explored(first, lambda: refused.append(pool.submit(second.connect)))
+        assert since_ns, exploration.outcome
         with pytest.raises(DeviceError, match='commands'):
             refused[0].result()
         assert exploration.outcome.success, exploration.outcome.message

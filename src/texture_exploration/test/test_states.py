@@ -11,8 +11,8 @@ import pytest
 from table_arm import TableArmParams
 
 from texture_core.types import ExplorationRequest, Phase
-from texture_exploration import force_control, guards, lift_first, safety, stages, touch, watches
-from texture_exploration.arms import arm
+from texture_exploration import force_control, guards, lift_first, safety, stages, surface, touch, watches
+from texture_exploration.arms import arm, ros_controllers, tool_state
 from texture_exploration.explorer import PERIOD_S
 from texture_exploration.motions import MOTIONS
 
@@ -41,6 +41,7 @@ def kind(command):
 
 HAPPENS = {
     'nothing': (None, lambda table: None),
+    'a force sensor that is zeroed late': (None, lambda table: None),
     'a stop in the slide': (Phase.SLIDE, lambda table: table.exploration.stop('enough')),
     'a stall': (Phase.SLIDE, lambda table: table.arm.jam()),
     'a push': (Phase.SLIDE, lambda table: table.arm.push(20.0)),
@@ -55,7 +56,10 @@ def test_each_state_commands_and_leads_to_what_its_row_says(make_table, monkeypa
     if phase:
         table.when[phase] = lambda: happens(table)
     plan, timed_step, begin = MOTIONS['linear_slide'], stages.Stage.timed_step, stages.Stage.begin
-    monkeypatch.setitem(MOTIONS, 'linear_slide', lambda *given: plan(*given).lift_first(lambda: True))
+    zeroed_ns = table.now_ns + (3_000_000_000 if 'late' in name else 0)
+    monkeypatch.setitem(
+        MOTIONS, 'linear_slide', lambda *given: plan(*given).lift_first(lambda: table.now_ns >= zeroed_ns)
+    )
 
     def noted(stage, time_ns, state):
         command = timed_step(stage, time_ns, state)
@@ -70,10 +74,32 @@ def test_each_state_commands_and_leads_to_what_its_row_says(make_table, monkeypa
     table.explore(ExplorationRequest('linear_slide', distance_m=0.02))
     assert {state for state, _ in seen} >= {lift_first.Rise, lift_first.CalmDown, stages.LiftStage}
     assert [(state.__name__, said) for state, said in seen if said not in STATES[state.__name__][0].split(', ')] == []
-    order = [name for name in STATES if name != 'GoBack']
+    order = [state for state in STATES if state != 'GoBack']
+    if not phase:
+        assert [state.__name__ for state in entered] == order
+        assert ((lift_first.CalmDown, 'up') in seen) is ('late' in name)
     for before, after in pairwise(state.__name__ for state in entered):
         follows = order[order.index(before) + 1 :][:1]
         assert after in follows or after.removesuffix('Stage') in STATES[before][2]
+
+
+@pytest.mark.parametrize('name', [state for state in STATES if state not in ('GoBack', 'LiftStage')])
+def test_a_stop_leads_from_each_state_to_what_its_row_says(make_table, monkeypatch, name):
+    table, entered = make_table(TableArmParams(start_height_m=0.003)), []
+    plan, begin = MOTIONS['linear_slide'], stages.Stage.begin
+    monkeypatch.setitem(MOTIONS, 'linear_slide', lambda *given: plan(*given).lift_first(lambda: True))
+
+    def begun(stage, *given):
+        entered.append(type(stage).__name__)
+        begin(stage, *given)
+        if entered[-1] == name:
+            table.exploration.stop('enough')
+
+    monkeypatch.setattr(stages.Stage, 'begin', begun)
+    table.arm.displace((0.01, 0.0, 0.0))  # off the start
+    outcome = table.explore(ExplorationRequest('linear_slide', distance_m=0.02))
+    assert (outcome.message, outcome.lifted, entered[-2:]) == ('enough', True, [name, 'LiftStage'])
+    assert 'Lift' in STATES[name][2]
 
 
 def values():
@@ -142,6 +168,10 @@ def test_the_sentences_of_the_pages_hold_the_limits_of_the_code():
             f'below {100 * touching.lost_force_fraction:g} % of the requested force',
             f'under {100 * touching.stall_speed_fraction:g} % of the path',
             f'mean force off by {100 * mean:g} %, speed by {100 * speed:g} %, peak by {100 * peak:g} %',
+            f'after {1e3 * tool_state.FOLLOW_M:g} mm commanded, {1e-9 * tool_state.FOLLOW_NS:g} s: lift',
+            f'motion after {1e-9 * ros_controllers.RESTS_WITHIN_NS:g} s is a fault',
+            f'guard, {1e3 * tool_state.HEARTBEAT_S:g} ms without heartbeat',
+            f'touches too light, before zeroing, within {1e3 * surface.NARROWEST_M:g} mm of another',
             f'outside {safety.RANGES["speed_m_s"][0]:g} to {limits.max_speed_m_s:g} m/s, {limits.min_force_n:g} to '
             f'{limits.max_force_n:g} N',
         ],

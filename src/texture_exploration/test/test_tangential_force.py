@@ -8,8 +8,12 @@ import numpy as np
 import pytest
 
 from texture_core.types import rotation_matrix
-from texture_exploration.arms.arm import SLIDING_M_S, tangential_force_n
+from texture_exploration.arms.arm import SLIDING_M_S, ArmState
 from texture_exploration.arms.ur import UrArm, UrArmParams, UrReport
+
+
+def tangential_force_n(force_n, velocity_m_s):
+    return ArmState(1, (0.0, 0.0, 0.0), velocity_m_s, force_n[2], along_n=force_n[:2]).tangential_force_n
 
 
 @pytest.mark.parametrize('turned_rad', [0.0, 0.7, 2.0, math.pi, -1.3])

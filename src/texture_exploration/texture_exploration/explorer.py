@@ -17,7 +17,7 @@ from texture_core.errors import DeviceError, ExplorationError, InvalidData, Moti
 from texture_core.types import ExplorationRequest, ExplorationState
 from texture_exploration.arms.arm import Arm, SurfaceFrame, Vector
 from texture_exploration.exploration import Exploration, arm_fault, no_signal_watch
-from texture_exploration.guards import Listening
+from texture_exploration.guards import Listening, sound
 from texture_exploration.lift_first import Rise
 from texture_exploration.motions import MOTIONS
 from texture_exploration.safety import SafetyLimits, SurfacePatch
@@ -111,7 +111,7 @@ class Explorer:
             state = self.arm.state()
         except DeviceError as error:
             return str(error)
-        return arm_fault(state, self.clock(), self.limits) or state.unsafe
+        return arm_fault(state, self.clock(), self.limits) or sound(state, state).unsafe
 
     @property
     def current(self) -> Exploration | None:

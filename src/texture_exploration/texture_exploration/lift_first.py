@@ -73,7 +73,6 @@ class Rise(Stage):
         self._zero_n = zero_n  # from which the force counts: that before the first of several rises
         self._air = FreeAir(touch.clearance_m, touch.contact_force_n)
         self._start_ns: int | None = None  # of the probe
-        self._rest_ns = 0
         self._heights_m: list[float] = []  # along the rise, and the forces there
         self._forces_n: list[Vector] = []
         self.free = False
@@ -85,7 +84,7 @@ class Rise(Stage):
     def begin(self, time_ns: int, arm: ArmState) -> None:
         """Note height and force at the start."""
         super().begin(time_ns, arm)
-        self._first, self._rest_ns = arm, time_ns
+        self._first = arm
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Go up, but no further than a finger may come down to look for the surface."""
@@ -102,7 +101,8 @@ class Rise(Stage):
                 "raise 'contact_force_n' above the noise of the force sensor",
                 ExplorationError.FORCE_SENSOR,
             )
-        if math.dist(arm.force_vector_n, self._zero_n or self._first.force_vector_n) > self._most_n:
+        # Written so that NaN also exceeds the limit.
+        if not math.dist(arm.force_vector_n, self._zero_n or self._first.force_vector_n) <= self._most_n:
             raise Detour(
                 f'the force changed by more than {self._most_n:g} N while the finger rose by {1e3 * risen_m:.2f} mm: '
                 'it is pressed harder than it may be, or something is above it; free it by hand',
@@ -123,8 +123,8 @@ class Rise(Stage):
                 'the arm moves although zero velocity is commanded; see what moves it', ExplorationError.ARM_FAULT
             )
         if math.dist(arm.position, self._first.position) > STILL_M:
-            self._first, self._rest_ns = arm, time_ns
-        if (time_ns - self._rest_ns) * 1e-9 < STILL_S:
+            self._first = arm
+        if (arm.time_ns - self._first.time_ns) * 1e-9 < STILL_S:  # a state that stays old is no rest
             return False
         self._first, self._start_ns = arm, time_ns
         self._zero_n = self._zero_n or arm.force_vector_n

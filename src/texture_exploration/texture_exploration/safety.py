@@ -40,10 +40,13 @@ def shown(force_n: float) -> str:
     return f'{force_n:.2f}' if abs(force_n) <= MOST_FORCE_N else f'{force_n:.3g}'
 
 
-def _edge(value: float, which: str) -> Any:
-    """Declare an edge of the workspace."""
-    text = f'{which} coordinate of the workspace in the surface frame; leaving it aborts.'
-    return param(value, text, unit='m', low=-2.0, high=2.0)
+WORKSPACE = 'coordinate of the workspace in the surface frame; leaving it aborts.'
+PATCH = 'coordinate of the surface patch; touches set it; one without extent is none.'
+
+
+def _edge(value: float, which: str, of: str = WORKSPACE) -> Any:
+    """Declare an edge of the workspace or of the patch."""
+    return param(value, f'{which} {of}', unit='m', low=-2.0, high=2.0)
 
 
 @dataclass(frozen=True)
@@ -213,20 +216,14 @@ class SafetyLimits:
 # The part of the surface on which an exploration with a start may begin.
 
 
-def _patch_edge(which: str) -> Any:
-    """Declare an edge of the patch."""
-    text = f'{which} coordinate of the surface patch; touches set it; one without extent is none.'
-    return param(0.0, text, unit='m', low=-2.0, high=2.0)
-
-
 @dataclass(frozen=True)
 class SurfacePatch:
     """The rectangle of the surface frame in which an exploration with a start stays; not taught without extent."""
 
-    patch_x_low_m: float = _patch_edge('Lowest x')
-    patch_x_high_m: float = _patch_edge('Highest x')
-    patch_y_low_m: float = _patch_edge('Lowest y')
-    patch_y_high_m: float = _patch_edge('Highest y')
+    patch_x_low_m: float = _edge(0.0, 'Lowest x', PATCH)
+    patch_x_high_m: float = _edge(0.0, 'Highest x', PATCH)
+    patch_y_low_m: float = _edge(0.0, 'Lowest y', PATCH)
+    patch_y_high_m: float = _edge(0.0, 'Highest y', PATCH)
 
     def start(self, request: ExplorationRequest, home: Vector, limits: SafetyLimits) -> Vector:
         """Return where an exploration begins: at `home`, or above its start at the same height."""

@@ -159,15 +159,15 @@ class SettleForceStage(Stage):
     def begin(self, time_ns: int, arm: ArmState) -> None:
         """Nothing has settled yet."""
         super().begin(time_ns, arm)
-        self._outside_ns = time_ns
+        self._outside_ns = arm.time_ns
         self._first_n = max(0.0, min(arm.force_n, self._force_n))
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Hold the force."""
         self._overshoot.update(arm)
         if abs(arm.force_n - self._force_n) > self._touch.force_tolerance * self._force_n:
-            self._outside_ns = time_ns
-        if (time_ns - self._outside_ns) * 1e-9 >= self._touch.settle_s and time_ns > self._outside_ns:
+            self._outside_ns = arm.time_ns
+        if (arm.time_ns - self._outside_ns) * 1e-9 >= self._touch.settle_s:  # a state that stays old has not settled
             return None
         rise = smooth(self.elapsed_s(time_ns) / PRESSING_S)
         return ArmCommand(force_n=self._first_n + (self._force_n - self._first_n) * rise)

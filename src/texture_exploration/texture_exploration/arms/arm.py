@@ -31,6 +31,7 @@ from texture_core.types import Array, rotation_matrix
 # Interface of every arm that carries the finger.
 
 Vector = tuple[float, float, float]  # x, y in the surface, z away from it
+SLIDING_M_S = 1e-3  # below, noise dominates the direction of travel
 
 
 @dataclass(frozen=True)
@@ -39,8 +40,7 @@ class ArmState:
 
     `time_ns` is when the arm measured it, of CLOCK_MONOTONIC; `position` in m, `velocity` in m/s; `force_n` is the
     force normal to the surface, positive when pressing; `along_n` that of the surroundings on the finger along x and y
-    of the surface, NaN if the arm measures the normal force only; `tangential_force_n` the force of the surface against
-    the direction of travel, NaN if the arm does not measure it or the finger does not slide. `fault` says why the arm
+    of the surface, NaN if the arm measures the normal force only. `fault` says why the arm
     cannot move; '' if it can. Without further commands the arm keeps its last velocity for `watchdog_s` at most; 0 if
     unknown. `delay_s` passes from a force to the motion that responds to it. `unsafe` says why the finger must be
     lifted although the arm obeys; '' if it need not. `place_ns` is when it was at `position`, by any clock; 0 if that
@@ -53,7 +53,6 @@ class ArmState:
     force_n: float
     fault: str = ''
     watchdog_s: float = 0.0
-    tangential_force_n: float = math.nan
     along_n: tuple[float, float] = (math.nan, math.nan)
     unsafe: str = ''
     delay_s: float = 0.0
@@ -69,6 +68,13 @@ class ArmState:
     def force_size_n(self) -> float:
         """The size of the whole force, as far as the arm measures it."""
         return math.hypot(*self.force_vector_n)
+
+    @property
+    def tangential_force_n(self) -> float:
+        """The force of the surface against the direction of travel; NaN if not measured, or if the finger rests."""
+        (vx, vy, _), (x, y) = self.velocity, self.along_n
+        speed_m_s = math.hypot(vx, vy)
+        return -(x * vx + y * vy) / speed_m_s if speed_m_s >= SLIDING_M_S else math.nan
 
 
 @dataclass(frozen=True)
@@ -274,20 +280,6 @@ class SurfaceArm(Arm):
                 'the command was refused and the arm stopped: a force is wanted, and the force sensor is not zeroed; '
                 f'rise by {1e3 * ZERO_RISE_M:g} mm in free air and rest, until the arm is zeroed'
             )
-
-
-# --------------------
-# Tangential force of a sliding finger, from the force vector of a wrist sensor.
-
-SLIDING_M_S = 1e-3  # below, noise dominates the direction of travel
-
-
-def tangential_force_n(force_n: Vector, velocity_m_s: Vector) -> float:
-    """Return the force of the surface against the direction of travel, N; NaN for a finger that does not slide."""
-    speed_m_s = math.hypot(*velocity_m_s[:2])
-    if not speed_m_s >= SLIDING_M_S:
-        return math.nan
-    return -(force_n[0] * velocity_m_s[0] + force_n[1] * velocity_m_s[1]) / speed_m_s
 
 
 # --------------------

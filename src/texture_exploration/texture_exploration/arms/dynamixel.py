@@ -1,48 +1,24 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Hands with Dynamixel motors: the bus, the hand, and the process that switches the torque off when its parent dies."""
+"""The bus of a hand with Dynamixel motors, and the process that switches their torque off when its parent dies."""
 
 from __future__ import annotations
 
 import contextlib
 import functools
 import importlib
-import math
 import os
 import sys
 import termios
-import threading
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import serial
 
-from texture_core.errors import CommandRefused, DeviceError
-from texture_exploration.arms.arm import (
-    DONE,
-    STANDSTILL,
-    ArmCommand,
-    GuardProcess,
-    check_command,
-    guard_socket,
-    lock_within,
-)
-from texture_exploration.arms.hand import (
-    POSITION_RAD,
-    ROLES,
-    VELOCITY_RAD_S,
-    X_SERIES,
-    ZERO,
-    FingerSet,
-    Fingertip,
-    HandState,
-    Joint,
-    Profile,
-    describe,
-    goes_on,
-    load_profile,
-)
+from texture_core.errors import DeviceError
+from texture_exploration.arms.arm import DONE, GuardProcess, guard_socket, lock_within
+from texture_exploration.arms.hand import POSITION_RAD, VELOCITY_RAD_S, X_SERIES, ZERO, Profile, describe, goes_on
 
 # --------------------
 # Motors on a Dynamixel bus, in physical units, through the unmodified dynamixel-sdk.
@@ -100,7 +76,7 @@ class DynamixelBus:
         self._energised: set[int] = set()
         self._goal_currents: dict[int, int] = {}  # as sent last
         self._device = device
-        self.lock = -1  # on the device
+        self._lock = -1  # on the device
         self._profile = profile
         self._port: Any = self._sdk.PortHandler(device)
         self._packets: Any = self._sdk.PacketHandler(PROTOCOL)
@@ -109,7 +85,7 @@ class DynamixelBus:
             # the input buffer when it opens the port, with answers to another program; so the lock is taken before.
             lock = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
             lock_within(lock, LOCKED_S)
-            self.lock = lock
+            self._lock = lock
             on_error.callback(self.close)
             opened = self._port.openPort() and self._port.setBaudRate(profile.baud)
             if opened:
@@ -127,9 +103,9 @@ class DynamixelBus:
         """Close the port; never raises."""
         with contextlib.suppress(*LINE_FAULTS):
             self._port.closePort()
-        if self.lock >= 0:
-            os.close(self.lock)
-            self.lock = -1
+        if self._lock >= 0:
+            os.close(self._lock)
+            self._lock = -1
 
     def start(self, *, rebooted: bool = False) -> None:
         """Find and check the motors, set mode and gains; only without an error let them hold their position.
@@ -243,7 +219,7 @@ class DynamixelBus:
             return measured
         # They answer in turn: a silent motor hides all after it.
         silent = next(motor for motor in asked if motor not in measured)
-        if not self._answers(silent):
+        if not any(self._ping(silent)[1] == SUCCESS for _ in range(TRIES - 1)):  # the read of all was the first try
             self.missing.add(silent)
         return {}
 
@@ -268,6 +244,11 @@ class DynamixelBus:
         body = bytes([SYNC_WRITE]) + params
         packet = b'\xff\xff\xfd\x00' + bytes([BROADCAST]) + (len(body) + 2).to_bytes(2, 'little') + body
         return packet + self._packets.updateCRC(0, packet, len(packet)).to_bytes(2, 'little')
+
+    def guard(self) -> GuardProcess:
+        """Start the process that holds the lock on the device, and switches the torque off once this one is gone."""
+        line = self._device, str(self._profile.baud), self.torque_off_packet().hex()
+        return GuardProcess(__name__, *line, holds=(self._lock,))
 
     def let_go(self) -> None:
         """Release all motors and verify it, as far as they can be reached; raises no error of the line."""
@@ -311,9 +292,9 @@ class DynamixelBus:
 
     def _reported(self, motor: int, bits: int, *, rebooted: bool = False) -> str:
         """Return the hardware error of a motor and the remedy as text."""
-        if rebooted:
-            return f'{self._profile.owner(motor)} still reports {_reasons(bits)}{AFTER_REBOOT}'
-        return f'{self._profile.owner(motor)} reports {_reasons(bits)}{REMEDY}'
+        known = ' and '.join(text for bit, text in HARDWARE_ERRORS.items() if bits >> bit & 1)
+        reasons, owner = known or f'hardware error {bits:#04x}', self._profile.owner(motor)
+        return f'{owner} still reports {reasons}{AFTER_REBOOT}' if rebooted else f'{owner} reports {reasons}{REMEDY}'
 
     def _counts(self, motor: int, current_a: float) -> int:
         """Return a current in counts, limited to the range of the motor, which would refuse the whole command."""
@@ -367,11 +348,6 @@ class DynamixelBus:
                     return bytes(packet[PACKET_PARAMETERS : PACKET_PARAMETERS + size]), result
         return b'', result
 
-    def _answers(self, motor: int) -> bool:
-        with self._line():
-            # The read of all motors was the first try.
-            return any(self._packets.ping(self._port, motor)[1] == SUCCESS for _ in range(TRIES - 1))
-
     def _ping(self, motor: int) -> tuple[int, int]:
         """Return the model number of a motor, and the result of the SDK."""
         with self._line():
@@ -407,12 +383,6 @@ class DynamixelBus:
             ) from error
 
 
-def _reasons(bits: int) -> str:
-    """Return the bits of the register Hardware Error Status as text."""
-    known = [text for bit, text in HARDWARE_ERRORS.items() if bits >> bit & 1]
-    return ' and '.join(known) or f'hardware error {bits:#04x}'
-
-
 def register_in(data: bytes, first: int, register: str) -> int:
     """Return a register, signed if it is longer than a byte, of a part of the table from the address `first` on."""
     address, size = X_SERIES[register]
@@ -440,268 +410,3 @@ def main() -> None:
 
 if __name__ == '__main__':
     main()
-
-
-# --------------------
-# A hand of Dynamixel motors in current-based position mode: the position leads, the current bounds the force.
-
-FIRST_STATE_S = 15.0  # some 15 requests to each motor, which take 16 ms each with a USB adapter as delivered
-COMMAND_S = 0.2  # time for which a command holds
-CLOSING_M_S = 0.02  # speed of a finger that comes down to press
-REACH_RAD = 0.3  # largest depth of the goal of a pressing motor within the object
-SLACK_RAD = 0.2  # largest distance between the goal and a blocked motor
-LONGEST_STEP_S = 0.05
-NOT_CONNECTED = 'the hand is not connected; connect it first'
-
-
-class DynamixelHand:
-    """Hold with some fingers, and move others as an arm does; one thread owns the bus.
-
-    A motor that is missing or reports an error is named in the fault of the state until the hand is connected again;
-    the others go on. However the thread or the process ends, the torque is switched off: by the thread itself, by a
-    guard process when the process is gone; and without a message for the time in the profile, the Bus Watchdog of the
-    motors stops them.
-    """
-
-    def __init__(self, profile: str, device: str) -> None:
-        self.profile: Profile = load_profile(profile)
-        self.finger_sets: Mapping[str, FingerSet] = self.profile.finger_sets
-        self._device = device
-        self._fingers = {name: DynamixelFinger(joints, self.profile) for name, joints in self.profile.fingers.items()}
-        self._state: HandState | None = None
-        self._failure = NOT_CONNECTED
-        self._doubt = ''
-        self._rebooted = False  # since the last connection
-        self._highest_a: Mapping[int, float] = {}
-        self._grip: Mapping[str, float] = {}
-        self._commands: dict[str, tuple[ArmCommand, float]] = {}
-        self._fresh = threading.Event()
-        self._closing = threading.Event()
-        self._thread: threading.Thread | None = None
-
-    def connect(self) -> None:
-        """Open the bus and find the motors; the present pose is the start of the fingers."""
-        self.close()
-        self._closing.clear()
-        self._fresh.clear()
-        self._failure = self._doubt = ''
-        self._thread = threading.Thread(target=self._run, name='dynamixel', daemon=True)
-        self._thread.start()
-        if not self._fresh.wait(FIRST_STATE_S) or self._failure:
-            failure = self._failure or f"the motors on '{self._device}' answer only partly; check the cables"
-            self.close()
-            raise DeviceError(failure)
-
-    def close(self) -> None:
-        """Release: torque off, and close the bus."""
-        self._closing.set()
-        if self._thread is not None:
-            self._thread.join()
-            self._thread = None
-        self._grip, self._commands = {}, {}
-        self._failure = self._failure or NOT_CONNECTED
-
-    def state(self) -> HandState:
-        """Return the newest state."""
-        if self._failure or self._state is None:
-            raise DeviceError(self._failure)
-        return self._state
-
-    def warning(self) -> str:
-        """Return what is not as it should be although the hand moves, '' if nothing."""
-        return self._doubt
-
-    def grip(self, forces_n: Mapping[str, float]) -> None:
-        """Press from the next cycle on."""
-        for name, force_n in forces_n.items():
-            self._check(name, ArmCommand(force_n=force_n))
-        self._grip = dict(forces_n)
-
-    def command(self, fingers: Sequence[str], command: ArmCommand) -> None:
-        """Follow from the next cycle on; a refused command stops these fingers."""
-        if self._failure:
-            raise DeviceError(self._failure)
-        for name in fingers:
-            self._check(name, command)
-        self._command_motors(fingers, command)
-
-    def reboot(self) -> None:
-        """Release, reboot the motors that report a hardware error, and stay unconnected."""
-        self.close()
-        bus = DynamixelBus(self._device, self.profile)
-        try:
-            bus.reboot()
-            self._rebooted = True
-        finally:
-            bus.close()
-
-    def _command_motors(self, fingers: Sequence[str], command: ArmCommand) -> None:
-        for name in fingers:
-            self._commands[name] = (command, time.monotonic())
-
-    def _check(self, name: str, command: ArmCommand) -> None:
-        """Refuse a command beyond its limits or beyond the current of the motor."""
-        check_command(command, lambda: self._command_motors([name], STANDSTILL))
-        joint, profile = self.profile.fingers[name]['press'], self.profile
-        highest_a = self._highest_a.get(joint.id, math.inf)
-        highest_n = (highest_a - profile.idle_a) * profile.torque_nm_a / abs(joint.lever_m)
-        if command.force_n is not None and command.force_n > highest_n:
-            self._command_motors([name], STANDSTILL)
-            raise CommandRefused(
-                f'the command was refused and {name} stopped: the force is {command.force_n:g} N, and the Current '
-                f'Limit of its motor allows {highest_n:.3g} N; ask for less, or raise that limit with DYNAMIXEL Wizard'
-            )
-
-    def _run(self) -> None:
-        bus = guard = None
-        try:
-            bus = DynamixelBus(self._device, self.profile)
-            # It holds the lock on the device, and switches the torque off once this process is gone.
-            line = self._device, str(self.profile.baud), bus.torque_off_packet().hex()
-            guard = GuardProcess(__name__, *line, holds=(bus.lock,))
-            self._highest_a = bus.limits_a
-            bus.start(rebooted=self._rebooted)
-            self._rebooted = False
-            self._doubt = self._doubtful(bus.deaf)
-            self._control_loop(bus)
-        except DeviceError as error:
-            self._failure = str(error)
-        except BaseException as error:
-            # Also an error of this program must neither leave the motors pressing nor pass in silence.
-            self._failure = f'the hand was released after an error in its program ({type(error).__name__}: {error})'
-            raise
-        finally:
-            if bus is not None:
-                bus.let_go()
-                bus.close()
-            if guard is not None:
-                guard.dismiss()
-            self._fresh.set()
-
-    def _control_loop(self, bus: DynamixelBus) -> None:
-        """Read, decide and write, in one cycle after the other."""
-        period_s = 1.0 / self.profile.rate_hz
-        for finger in self._fingers.values():
-            finger.restart()
-        now_s = stepped_s = time.monotonic()
-        errors: dict[str, None] = {}
-        while not self._closing.wait(max(0.0, now_s + period_s - time.monotonic())):
-            now_s = time.monotonic()
-            motors = bus.read()
-            if not motors:
-                if bus.missing and self._fresh.is_set():
-                    self._publish(bus, errors)  # at once: before the others have been read again
-                continue
-            if error := bus.check_next():
-                errors[error] = None
-            goals = self._step(motors, min(LONGEST_STEP_S, now_s - stepped_s), now_s)
-            stepped_s = now_s
-            self._publish(bus, errors)
-            bus.write_goals(goals)
-
-    def _doubtful(self, deaf: Iterable[int]) -> str:
-        """Return a warning about motors whose watchdog may not stop them, '' if there are none."""
-        numbers = ', '.join(map(str, sorted(deaf)))
-        if not numbers or not self.profile.watchdog:
-            return ''
-        return (
-            f'the watchdog of motors {numbers} may not stop them when the cable is out or the computer hangs: their '
-            'firmware is known to go on; update it with DYNAMIXEL Wizard'
-        )
-
-    def _step(self, motors: Mapping[int, MotorState], dt_s: float, now_s: float) -> dict[int, tuple[float, float]]:
-        goals: dict[int, tuple[float, float]] = {}
-        for name, finger in self._fingers.items():
-            finger.measure(motors)
-            command, given_s = self._commands.get(name, (STANDSTILL, now_s))
-            if name in self._grip:
-                command = ArmCommand(force_n=self._grip[name])
-            elif now_s - given_s > COMMAND_S:
-                command = STANDSTILL
-            goals.update(finger.goals(command, dt_s))
-        return goals
-
-    def _publish(self, bus: DynamixelBus, errors: Iterable[str]) -> None:
-        fault = '; '.join(dict.fromkeys([*map(bus.why_missing, sorted(bus.missing)), *errors]))
-        tips = {name: finger.tip for name, finger in self._fingers.items()}
-        self._state = HandState(time.monotonic_ns(), tips, fault)
-        self._fresh.set()
-
-
-class DynamixelFinger:
-    """Angles and currents of a finger's motors, as a fingertip and back.
-
-    The levers turn angles into ways around the pose at the start; across and along are arcs that are taken as straight.
-    """
-
-    def __init__(self, joints: Mapping[str, Joint], profile: Profile) -> None:
-        self._joints = joints
-        self._profile = profile
-        self.restart()
-
-    def restart(self) -> None:
-        """The next measurement is the pose at the start."""
-        self._motors: dict[str, MotorState] = {}
-        self._start: dict[str, float] = {}
-        self._goal: dict[str, float] = {}
-        self._pressing = False
-
-    def measure(self, motors: Mapping[int, MotorState]) -> None:
-        """Take the measurements of the motors; a missing one keeps its last."""
-        for role, joint in self._joints.items():
-            motor = motors.get(joint.id)
-            if motor is not None:
-                self._motors[role] = motor
-                self._start.setdefault(role, motor.position_rad)
-                self._goal.setdefault(role, motor.position_rad)
-
-    @property
-    def tip(self) -> Fingertip:
-        """Place, speed and force."""
-        ways, speeds = dict.fromkeys(ROLES, 0.0), dict.fromkeys(ROLES, 0.0)
-        for role, motor in self._motors.items():
-            lever_m = self._joints[role].lever_m
-            ways[role] = (motor.position_rad - self._start[role]) * lever_m
-            speeds[role] = motor.velocity_rad_s * lever_m
-        place = (ways['across'], ways['along'], self._profile.start_height_m - ways['press'])
-        return Fingertip(place, (speeds['across'], speeds['along'], -speeds['press']), self._force_n())
-
-    def goals(self, command: ArmCommand, dt_s: float) -> dict[int, tuple[float, float]]:
-        """Return highest current and position for each motor."""
-        profile = self._profile
-        speeds = dict(zip(('across', 'along'), command.tangential_m_s, strict=True))
-        goals = {}
-        for role, joint in self._joints.items():
-            if role not in self._goal:
-                continue
-            if role == 'press':
-                goals[joint.id] = self._press(command, joint, dt_s)
-            else:
-                self._advance(role, speeds[role] * dt_s / joint.lever_m, SLACK_RAD)
-                goals[joint.id] = (profile.move_a, self._goal[role])
-        return goals
-
-    def _press(self, command: ArmCommand, joint: Joint, dt_s: float) -> tuple[float, float]:
-        """Pressing, the goal lies within the object and the current bounds the force; else the position leads."""
-        pressing = command.force_n is not None
-        if self._pressing and not pressing:
-            self._goal['press'] = self._motors['press'].position_rad
-        self._pressing = pressing
-        if command.force_n is None:
-            self._advance('press', -command.normal_m_s * dt_s / joint.lever_m, SLACK_RAD)
-            return self._profile.move_a, self._goal['press']
-        self._advance('press', CLOSING_M_S * dt_s / joint.lever_m, REACH_RAD)
-        return self._profile.idle_a + command.force_n * abs(joint.lever_m) / self._profile.torque_nm_a, self._goal[
-            'press'
-        ]
-
-    def _advance(self, role: str, angle_rad: float, max_lead_rad: float) -> None:
-        at = self._motors[role].position_rad
-        self._goal[role] = min(at + max_lead_rad, max(at - max_lead_rad, self._goal[role] + angle_rad))
-
-    def _force_n(self) -> float:
-        if 'press' not in self._motors:
-            return 0.0
-        lever = self._joints['press'].lever_m
-        pressing_a = math.copysign(self._motors['press'].current_a, self._motors['press'].current_a * lever)
-        return max(0.0, pressing_a - self._profile.idle_a) * self._profile.torque_nm_a / abs(lever)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Hands of Dynamixel motors: states, finger sets, profiles and models of force."""
+"""Hands of Dynamixel motors: finger sets, profiles and models of force."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from typing import Any, NamedTuple, get_type_hints
 
 from texture_core.config import find_file, load_yaml, unknown_name
 from texture_core.errors import InvalidParameter, TextureError
-from texture_exploration.arms.arm import Vector
 
 # --------------------
 # Dynamixel models by number: current per count, and torque per current.
@@ -69,23 +68,7 @@ def describe(model: int) -> str:
 
 
 # --------------------
-# The state of a hand, which holds with some fingers and moves others as an arm does.
-
-
-class Fingertip(NamedTuple):
-    """Position, velocity and force of one fingertip, in the frame of its patch of the object; see `ArmState`."""
-
-    position: Vector
-    velocity: Vector
-    force_n: float
-
-
-class HandState(NamedTuple):
-    """All fingertips at one time of CLOCK_MONOTONIC; `fault` says why the hand cannot move, '' if it can."""
-
-    time_ns: int
-    fingers: Mapping[str, Fingertip]
-    fault: str = ''
+# A hand holds with some fingers and moves others as an arm does.
 
 
 class FingerSet(NamedTuple):

@@ -61,7 +61,7 @@ class SimulatedArm(Arm):
         self._own_thread = own_thread
         self._last_command = (STANDSTILL, clock())  # the command, and when it came
         start: Vector = (0.0, 0.0, params.start_height_m)
-        self._state = ArmState(clock(), start, (0.0, 0.0, 0.0), 0.0, along_n=(0.0, 0.0))
+        self._state = ArmState(clock(), start, (0.0, 0.0, 0.0), 0.0)
         self._closing = threading.Event()
         self._thread: threading.Thread | None = None
         self._emulator = FingerSender(params.finger_pipe)
@@ -127,21 +127,18 @@ class SimulatedArm(Arm):
         return self._params.stiffness_n_m * max(0.0, -z_m) if x_m < edge_m else 0.0
 
     def _moved_m(self, command: ArmCommand, dt_s: float) -> Vector:
-        vx, vy = command.tangential_m_s
-        return vx * dt_s, vy * dt_s, self._normal_step(command, dt_s)
-
-    def _normal_step(self, command: ArmCommand, dt_s: float) -> float:
-        """Return the change of height in one step, m.
+        """Return the motion in one step, m.
 
         Admittance control, vz = a·(F − F_wanted), solved exactly over the step: with F = k·depth the force error
         decays as exp(−a·k·t), which no step size makes unstable.
         """
+        vx, vy = command.tangential_m_s
         if command.force_n is None:
-            return command.normal_m_s * dt_s
+            return vx * dt_s, vy * dt_s, command.normal_m_s * dt_s
         admittance = self._params.admittance_m_s_n
         decay_s = admittance * self._params.stiffness_n_m
         effective_s = -math.expm1(-decay_s * dt_s) / decay_s if decay_s > 0 else dt_s
-        return admittance * (self._state.force_n - command.force_n) * effective_s
+        return vx * dt_s, vy * dt_s, admittance * (self._state.force_n - command.force_n) * effective_s
 
     def _run(self) -> None:
         last_ns = self._clock()

@@ -22,7 +22,6 @@ from texture_exploration.arms.arm import (
     SurfacePoseParams,
     Vector,
     ZeroingParams,
-    tangential_force_n,
 )
 from texture_exploration.force_control import ForceLoopParams
 from texture_exploration.guards import WITHOUT_GAPS
@@ -251,7 +250,6 @@ class ToolState:
             self._velocity,
             self._force_n,
             fault,
-            tangential_force_n=tangential_force_n(self._force_vector_n, self._velocity),
             along_n=self._force_vector_n[:2],
             delay_s=self._params.loop_delay_s + self._params.force_smoothing_s,
             place_ns=self._place_ns,

@@ -34,7 +34,6 @@ from texture_exploration.arms.arm import (
     ZeroingParams,
     claim,
     give_up_when_ending,
-    tangential_force_n,
 )
 
 # --------------------
@@ -146,11 +145,15 @@ class WorkerLink:
             raise DeviceError(self._why_ended())
 
     def send(self, command: UrCommand | None) -> None:
-        """Send a command to the worker, or that it is to stop, without waiting."""
+        """Send a command to the worker, or that it is to stop, without waiting.
+
+        A worker that does not read gets no more: commands expire, and the age of its report shows whether it hangs.
+        """
         try:
             self._channel.send(json.dumps(command).encode(), socket.MSG_DONTWAIT)
         except BlockingIOError as error:
-            raise DeviceError('the process that talks to the controller hangs; connect again') from error
+            if command is None:
+                raise DeviceError('the process that talks to the controller does not read a stop') from error
         except OSError as error:
             raise DeviceError(self._why_ended()) from error
 
@@ -332,9 +335,10 @@ def check_program(params: UrArmParams, *, pause_is_ours: bool) -> None:
     end_s = time.monotonic() + max(ACKNOWLEDGE_S, 1.0 / params.watchdog_hz) + WATCHDOG_S
     while program := _program(ip):
         if pause_is_ours and program.upper().startswith('PAUSED'):
-            _stop(ip)
-            return
-        if time.monotonic() > end_s:
+            with dashboard(ip) as ask:
+                ask('stop')
+            pause_is_ours, end_s = False, time.monotonic() + UR_PROGRAM_STOPPING_S
+        elif time.monotonic() > end_s:
             raise DeviceError(
                 f"another program is on the controller at {ip} ('{program}'), and connecting would stop it; stop it on "
                 'the pendant'
@@ -347,19 +351,6 @@ def _program(ip: str) -> str:
     with dashboard(ip) as ask:
         running, state = ask('running'), ask('programState')
     return state if 'true' in running.lower() or not state.upper().startswith('STOPPED') else ''
-
-
-def _stop(ip: str) -> None:
-    """Stop it."""
-    with dashboard(ip) as ask:
-        ask('stop')
-    end_s = time.monotonic() + UR_PROGRAM_STOPPING_S
-    while program := _program(ip):
-        if time.monotonic() > end_s:
-            raise DeviceError(
-                f"the program on the controller at {ip} ('{program}') does not stop; stop it on the pendant"
-            )
-        time.sleep(SAMPLE_PERIOD_S)
 
 
 BASE_FRAME_ID = 'base'  # as in ur_robot_driver and the description of UR, without a prefix
@@ -450,15 +441,14 @@ class UrArm(SurfaceArm):
         """Return the newest state."""
         report = self._report()
         frame = self._frame
-        velocity, force = frame.direction(report.velocity_m_s), frame.direction(report.force_n)
+        force = frame.direction(report.force_n)
         return ArmState(
             time_ns=report.time_ns,
             position=frame.place(report.position_m),
-            velocity=velocity,
+            velocity=frame.direction(report.velocity_m_s),
             force_n=force[2],
             fault=self._fault(report),
             watchdog_s=report.watchdog_s,
-            tangential_force_n=tangential_force_n(force, velocity),
             along_n=force[:2],
             delay_s=DELAY_S,
         )

@@ -374,9 +374,7 @@ class ExplorerNode(PatientLifecycleNode):
 
     def _forget_touches(self) -> str:
         count = self._explorer.forget_touches()
-        touches = 'the touch is' if count == 1 else f'{count} touches are'
-        forgotten = f'{touches} forgotten' if count else 'no touch was recorded, so none is removed'
-        return f'{forgotten}; the surface stays as it is'
+        return f'touches of the surface that are forgotten: {count}; the surface stays as it is'
 
     def _on_estimate(self, message: msg.TextureEstimate | msg.RoughnessEstimate) -> None:
         try:

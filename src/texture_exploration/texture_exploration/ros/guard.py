@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import re
 import select
 import subprocess
 import sys
@@ -88,6 +89,7 @@ TWIST_GUARD_NODE = 'arm_guard'
 MOVING, RESTING = b'm', b'r'
 PERIOD_S = 0.01
 ANSWER_S = 0.05
+ANSWER = re.compile(rb'(\d{1,6}) ([0-9a-f]{24})')  # of a guard: the subscribers that it has found, and its participant
 # Longest silence of a guard before it counts as hung. Next to two busy processes it was silent for more than 0.5 s
 # in two of eight runs; if the explorer also dies in that time, the timeout of the controller, where there is
 # one, and the limits of the robot remain. A guard that has ended is detected at once.
@@ -121,11 +123,11 @@ class TwistGuard(GuardProcess):
         """Return in a sentence why the guard would not stop the arm, '' if it would or is still starting."""
         with contextlib.suppress(OSError):
             while answer := self.line.recv(4096):
-                reached, _, sender_of_guard = answer.decode('ascii', 'replace').partition(' ')
-                if not (reached.isdigit() and sender_of_guard):
+                if found := ANSWER.fullmatch(answer):
+                    self.reached, self.participant = int(found[1]), found[2].decode()
+                    self._heard_s = time.monotonic()
+                else:
                     self.garbled += 1
-                    continue
-                self.reached, self.participant, self._heard_s = int(reached), sender_of_guard, time.monotonic()
         if self._process.poll() is not None:
             return 'the guard process, which would stop the arm if this process dies, has ended'
         silent_s = time.monotonic() - self._heard_s
@@ -204,7 +206,7 @@ def guarded(
                 return
             if not received:
                 break
-            moving, heard_s = received == MOVING, now_s
+            moving, heard_s = received != RESTING, now_s
             rest.forget()
         elif moving and now_s - heard_s > HEARTBEAT_S and not rest.at_rest:
             take_pose(rest)
