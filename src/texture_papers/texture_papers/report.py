@@ -168,7 +168,7 @@ SEARCHED = '; the first alone, whose slides for training the search was given'
 
 
 def run(protocol: PaperProtocol, experiment: Experiment) -> ExperimentResult:
-    """Rebuild a paper's experiment on simulated surfaces; with a search, by the recipes that it finds."""
+    """Reproduce a paper's experiment on simulated surfaces; with a search, by the recipes that it finds."""
     scene = load_scene(protocol.scene)
     tuned = searched(protocol, experiment) if experiment.tune else NONE
     found = outcomes(protocol, scene, experiment.seed, quick=experiment.quick, tuned=tuned)
