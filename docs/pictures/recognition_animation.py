@@ -81,7 +81,7 @@ class Panel:
         end_s = shown.duration_s
         scene.set(xlim=(0, 1.3 * end_s), ylim=(0, 1))
         scene.set_axis_off()
-        scene.set_title(title, fontsize=15, loc='left')
+        scene.set_title(title, fontsize=12, loc='left')
         rng = np.random.default_rng(len(shown.surface))
         ground = 0.22 + 0.05 * rng.random(160)
         scene.fill_between(np.linspace(0, 1.3 * end_s, 160), ground, color='#c9b79c', linewidth=0)
@@ -93,16 +93,16 @@ class Panel:
         [self._trace] = signal.plot([], [], color=COLOURS[0], linewidth=0.5)
         top = 1.05 * np.abs(shown.samples[self._seconds <= end_s]).max()
         signal.set(xlim=scene.get_xlim(), ylim=(-top, top), yticks=[], xticks=[])
-        signal.set_ylabel('signal', fontsize=13)
+        signal.set_ylabel('signal', fontsize=12)
         probability.set(xlim=scene.get_xlim(), ylim=(0, 1.04), yticks=[0, 0.5, 1])
-        probability.set_xlabel('sliding time (s)', fontsize=13)
-        probability.set_ylabel('probability', fontsize=13)
+        probability.set_xlabel('sliding time (s)', fontsize=12)
+        probability.set_ylabel('probability', fontsize=12)
         colours = dict(zip(shown.labels, COLOURS, strict=False))
         self._lines = {name: probability.plot([], [], color=colours[name], linewidth=2.2)[0] for name in shown.labels}
-        style = {'fontsize': 13, 'va': 'center', 'ha': 'right'}
+        style = {'fontsize': 12, 'va': 'center', 'ha': 'right'}
         self._names = {name: probability.text(0, 0, '', color=colours[name], **style) for name in colours}
         self._verdict = probability.text(
-            0.97, 0.5, '', fontsize=15, fontweight='bold', ha='right', va='center', transform=probability.transAxes
+            0.97, 0.5, '', fontsize=13, fontweight='bold', ha='right', va='center', transform=probability.transAxes
         )
 
     def draw(self, now_s: float) -> None:
@@ -140,7 +140,7 @@ class Panel:
 
 def animate(slides: list[Shown], path: Path) -> None:
     """Write the animation: one slide after the other, then both results."""
-    figure, axes = plt.subplots(3, 2, figsize=(8.0, 5.2), height_ratios=(2.4, 1.3, 3), layout='constrained')
+    figure, axes = plt.subplots(3, 2, figsize=(6.4, 4.4), height_ratios=(2.4, 1.3, 3), layout='constrained')
     titles = (f'{SHOWN[0]}: trained', f'{SHOWN[1]}: never trained')
     panels = [Panel(slide, *column, title) for slide, column, title in zip(slides, axes.T, titles, strict=True)]
     for axis in axes[1:].ravel():
@@ -155,7 +155,7 @@ def animate(slides: list[Shown], path: Path) -> None:
 
     moving = range(round(float(ends[-1]) * FRAMES_PER_S * SLOWER))
     hold = [-1] * round(HOLD_S * FRAMES_PER_S)
-    FuncAnimation(figure, draw, frames=[-1, *moving, *hold]).save(path, PillowWriter(FRAMES_PER_S), dpi=90)
+    FuncAnimation(figure, draw, frames=[-1, *moving, *hold]).save(path, PillowWriter(FRAMES_PER_S), dpi=112)
 
 
 if __name__ == '__main__':

@@ -58,7 +58,7 @@ def draw(sensor: str) -> None:
     found = channels(sensor, touch)
     title = f'Simulated {name} over {surface}, {1e3 * speed_m_s:g} mm/s, {force_n:g} N'
     path = Path(__file__).with_name(f'sensor_{sensor}.png')
-    with chart(path, (5.8, 6.4), title, points=10.5) as figure:
+    with chart(path, (5.8, 6.4), title) as figure:
         vibration, pressure, spectrum = figure.subplots(3, 1)
         colours = iter(COLOURS)
         for axes, names in ((vibration, fast), (pressure, slow)):
@@ -72,12 +72,13 @@ def draw(sensor: str) -> None:
             values, rate_hz, unit = found[channel]
             sliding = values[int(SLIDE_FROM_S * rate_hz) : int((SLIDE_FROM_S + SLIDE_S) * rate_hz)]
             hz, power = signal.periodogram(sliding, rate_hz, 'hann')
-            spectrum.loglog(hz[3:], power[3:], linewidth=0.9, color=colour, label=channel)
+            spectrum.semilogx(hz[3:], 10 * np.log10(power[3:]), linewidth=0.9, color=colour, label=channel)
+        spectrum.xaxis.set_major_formatter('{x:g}')
         passes_hz = speed_m_s / pitch_m
         spectrum.axvline(
             passes_hz, color='black', linestyle='--', linewidth=1, zorder=0, label=f'{passes_hz:.0f} Hz: speed / pitch'
         )
-        spectrum.set(xlabel='frequency (Hz)', ylabel=f'power ({unit}²/Hz)', xlim=(5, hz[-1]))
+        spectrum.set(xlabel='frequency (Hz)', ylabel=f'power (dB of {unit}²/Hz)', xlim=(5, hz[-1]))
         for axes in (vibration, pressure, spectrum):
             axes.legend(loc='lower right', bbox_to_anchor=(1.02, 0.98), ncols=4, columnspacing=1.0, handlelength=1.2)
 

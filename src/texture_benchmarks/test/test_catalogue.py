@@ -5,6 +5,9 @@ import re
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from PIL import Image
 
 from texture_benchmarks.catalogue import BENCHMARKS
 from texture_benchmarks.generalisation import generalisation_chart
@@ -35,9 +38,22 @@ def test_every_benchmark_has_its_line_on_the_page_and_make_runs_some() -> None:
         ('trust', failures_chart),
     ],
 )
-def test_the_charts_of_the_pages_can_be_drawn_from_the_stored_figures(name, draw, tmp_path: Path) -> None:
+def test_the_charts_of_the_pages_can_be_read_on_a_phone_and_drawn_from_the_stored_figures(
+    name, draw, tmp_path: Path, monkeypatch
+) -> None:
     numbers = json.loads((PAGES / 'charts' / f'{name}.json').read_text(encoding='utf-8'))['numbers']
-    assert draw(numbers, tmp_path / 'chart.png').is_file()
+    sizes: list[float] = []
+
+    def note_sizes(figure: Figure, path: Path, **options: object) -> None:
+        saved(figure, path, **options)
+        sizes.extend(text.get_fontsize() for text in figure.findobj(Text) if text.get_text())
+
+    saved = Figure.savefig
+    monkeypatch.setattr(Figure, 'savefig', note_sizes)
+    path = draw(numbers, tmp_path / 'chart.png')
+    with Image.open(path) as picture:
+        width_in = picture.width / picture.info['dpi'][0]
+    assert min(sizes) / 72 / width_in * 380 >= 9, 'text below 9 pixels on a phone'
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.transforms import blended_transform_factory
 from sklearn.discriminant_analysis import QuadraticDiscriminantAnalysis
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
@@ -640,7 +641,7 @@ def generalisation_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
         for row, cells in numbers[SPACING].items()
     }
     heights = [3.4, *(0.8 + 0.21 * sum(len(cells) + 1.5 for cells in rows.values()) for rows in (few, numbers[OTHER]))]
-    with chart(path, (7.0, sum(heights)), points=10.5) as figure:
+    with chart(path, (6.0, sum(heights))) as figure:
         parts: Any = figure.subfigures(3, 1, height_ratios=heights)
         _draw_distance(parts[0].subplots(), numbers[DISTANCE])
         spacing, other = (part.subplots() for part in parts[1:])
@@ -672,8 +673,10 @@ def _draw_distance(axes: Any, rows: Mapping[str, Mapping[str, Any]]) -> None:
 def _draw_bars(axes: Any, rows: Mapping[str, Mapping[str, Any]], title: str) -> None:
     """Draw accepted and correct in colour, rejected but correct in its shade, accepted but wrong in black."""
     ticks, names, at = [], [], 0.0
+    from_the_left = blended_transform_factory(axes.figure.transSubfigure, axes.transData)
     for row, cells in rows.items():
-        axes.text(0, at, row, va='center', fontweight='bold')
+        label = axes.text(0.02, at, row, va='center', fontweight='bold', transform=from_the_left)
+        label.set(in_layout=False, bbox={'facecolor': 'white', 'edgecolor': 'none', 'pad': 0})
         at += 1.0
         for name, cell in cells.items():
             correct, wrong, right = (100 * cell[key] for key in ('accepted_correct', 'accepted_wrong', 'accuracy'))

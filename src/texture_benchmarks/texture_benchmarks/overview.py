@@ -229,7 +229,7 @@ def sliding_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
     """Draw the accuracy of slides over the sliding time, with the interval of ours, in a panel for the channels."""
     counts = {cell['slides'] for cells in numbers.values() for cell in cells.values()}
     title = f'Accuracy on the same track, {max(counts)} later slides'
-    with chart(path, (7.0, 7.6), title, points=11.0) as figure:
+    with chart(path, (6.2, 7.4), title) as figure:
         for axes, channels in zip(figure.subplots(2, 1, sharex=True), (VIBRATION, ALL_CHANNELS), strict=True):
             _draw_sliding(axes, _shown(numbers, channels))
             axes.set_title(channels)
@@ -266,7 +266,7 @@ def _draw_sliding(axes: Any, shown: Mapping[str, Mapping[str, Any]]) -> None:
             axes.plot(ends['mean_s'], wrong_percent(ends['accuracy']), '*', markersize=15, markeredgecolor='black',
                       zorder=5, **style)  # fmt: skip
     last = [float(np.log10(wrong_percent(cell['share'][-1]))) for cell in shown.values()]
-    for (name, cell), height in zip(shown.items(), spread(last, 0.24), strict=True):
+    for (name, cell), height in zip(shown.items(), spread(last, 0.3), strict=True):
         axes.text(6.25, 10**height, name, va='center', **STYLES[cell['kind']])
     axes.set(xscale='log', yscale='log', xlim=(0.45, 6.1), ylim=(100.0, LEAST * 0.8), ylabel='accuracy (%)')
     axes.set_xticks([s for s in TICKS_S if s > 0.4], [f'{s:g}' for s in TICKS_S if s > 0.4])
@@ -299,7 +299,7 @@ def computing_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
     points = [(cell['latency_us']['median'], value) for (_, _, cell), value in zip(cells, accuracies, strict=True)]
     front = pareto_front(points)
     title = f'Accuracy on the same track after {AT_S:g} s, by computing time'
-    with chart(path, (7.0, 7.2), title, points=11.0) as figure:
+    with chart(path, (6.2, 7.4), title) as figure:
         axes = figure.subplots()
         axes.step([points[at][0] for at in front], wrong_percent([points[at][1] for at in front]), where='post',
                   color='black', linewidth=1.0, zorder=1, label='Pareto front')  # fmt: skip
@@ -314,7 +314,7 @@ def computing_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
             axes.plot([], [], 'o', markersize=7, label=kind, **STYLES[kind])
         for channels, mark in MARKS.items():
             axes.plot([], [], mark, color='white', markeredgecolor='black', markersize=7, label=channels)
-        axes.plot([], [], '-', color='grey', label='across: 99 of 100 windows; upright: 95 % interval')
+        axes.plot([], [], '-', color='grey', label='across: 99 of 100 windows;\nupright: 95 % interval')
         axes.set(xscale='log', yscale='log', ylim=(110.0, LEAST * 0.8), ylabel='accuracy (%)')
         axes.set_yticks([*TICKS], [*TICKS.values()])
         axes.set_xlabel('computing time of a window, median (µs)')

@@ -294,8 +294,8 @@ def ablation_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
     panels = numbers['terms']
     terms = {name: {t: row for t, row in figures.items() if isinstance(row, dict)} for name, figures in panels.items()}
     rows = -(-len(panels) // COLUMNS)
-    size = (7.2, 1.1 + rows * (0.9 + 0.27 * max(map(len, terms.values()))))
-    with chart(path, size, 'Change of accuracy without a term of a simulated scene', points=10.5) as figure:
+    size = (6.0, 0.6 + rows * (0.9 + 0.27 * max(map(len, terms.values()))))
+    with chart(path, size, 'Change of accuracy without a term of a simulated scene') as figure:
         grid = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
         for axes, (name, row) in zip(grid, terms.items(), strict=False):
             _draw_terms(axes, row)
@@ -304,7 +304,10 @@ def ablation_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
             )
         for axes in grid[len(panels) :]:
             axes.axis('off')
-        figure.legend(*grid[0].get_legend_handles_labels(), loc='outside lower left', title='the term is left out of')
+        grid[len(panels) - 1].set_xlabel('change (percentage points)')
+        for axes in grid[len(panels) :][:1]:
+            handles, names = grid[1].get_legend_handles_labels()
+            axes.legend(handles, names, loc='center', title='the term is left out of')
     return Path(path)
 
 
@@ -322,7 +325,7 @@ def _draw_terms(axes: Any, terms: Mapping[str, Mapping[str, Mapping[str, float]]
         )  # fmt: skip
     axes.axvline(0.0, color='black', linewidth=0.8)
     axes.set_yticks(np.arange(len(terms)), [term.replace('_', ' ') for term in terms])
-    axes.set(xlabel='change (percentage points)', ylim=(len(terms) - 0.5, -0.5))
+    axes.set(ylim=(len(terms) - 0.5, -0.5))
 
 
 # Dear scenes are measured less often: stick-slip costs ten times as much, eight channels five times.

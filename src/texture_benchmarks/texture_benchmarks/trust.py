@@ -262,16 +262,16 @@ LINES: Mapping[str, tuple[str, str, str]] = {
 
 def failures_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
     """Draw the accuracy of three methods under each disturbance, how ours ends, and unknown materials accepted."""
-    with chart(path, (6.0, 14.0), points=11.0) as figure:
-        grid = figure.subplots(10, 2, height_ratios=[1.0, 0.5] * 5, sharey='row')
+    with chart(path, (6.0, 14.2)) as figure:
+        grid = figure.subplots(10, 2, height_ratios=[1.0, 0.55] * 4 + [0.55, 0.05], sharey='row')
         panels = [*zip(grid[::2].flat, grid[1::2].flat, strict=True)]
-        for unused in panels.pop():
-            unused.axis('off')
+        for unused in (*panels.pop(), *panels.pop()):
+            unused.remove()
         trained = trained_ranges(load_recipe(OURS).augmentation)
         for (lines, strip), (name, sweep) in zip(panels, ROWS.items(), strict=False):
             _draw_sweep(lines, strip, sweep, numbers, trained.get(name))
             lines.set_title(sweep.title)
-        _draw_unknown(*panels[-1], numbers['unknown_materials'])
+        _draw_unknown(figure.add_subplot(grid[0, 0].get_gridspec()[8, :]), numbers['unknown_materials'])
         for lines, strip in zip(grid[:8:2, 0], grid[1:8:2, 0], strict=True):
             lines.set_ylabel('accuracy (%)')
             strip.set_ylabel('slides (%)')
@@ -318,15 +318,14 @@ def _draw_sweep(
                               for strength, name in rows], rotation=60 if crowded else 0)  # fmt: skip
 
 
-def _draw_unknown(panel: Any, below: Any, unknown: Mapping[str, Mapping[str, Any]]) -> None:
+def _draw_unknown(panel: Any, unknown: Mapping[str, Mapping[str, Any]]) -> None:
     """Draw the fraction of slides over unknown materials that each recipe accepts, with its draws."""
-    below.axis('off')
     for place, found in enumerate(unknown.values()):
         accepted = 100 * np.array(found['accepted'])
-        panel.bar(place, accepted.mean(), 0.6, color=WRONG)
-        panel.plot(np.full(len(accepted), place), accepted, '.', color='black')
-    panel.set_xticks(range(len(unknown)), [name.replace('-and-', '-\nand-') for name in unknown])
-    panel.set(title='unknown materials', ylabel='accepted (%)')
+        panel.barh(place, accepted.mean(), 0.6, color=WRONG)
+        panel.plot(accepted, np.full(len(accepted), place), '.', color='black')
+    panel.set_yticks(range(len(unknown)), list(unknown))
+    panel.set(title='unknown materials: mean and each choice', xlabel='accepted (%)')
 
 
 def _draw_ends(strip: Any, accuracies: Array) -> None:

@@ -21,7 +21,7 @@ from functools import cache, partial
 from importlib.metadata import EntryPoint, entry_points, version
 from typing import cast
 
-from texture_core.cli import Command, run_program, show_progress
+from texture_core.cli import Command, Parser, run_program, show_progress
 from texture_core.config import find
 
 GROUP, PACKAGE = 'texture.commands', 'texture_bringup'
@@ -90,7 +90,7 @@ def _dispatch(given: Sequence[str]) -> int:
     name, *rest = given
     command = find(installed(), name, 'sub-command of texture')
     module = cast(Command, command.load())
-    parser = argparse.ArgumentParser(prog=f'texture {name}', description=summary(command))
+    parser = Parser(prog=f'texture {name}', description=summary(command))
     module.configure(parser)
     show_progress()
     return module.run(parser.parse_args(rest))

@@ -282,10 +282,17 @@ def draw(slides: Sequence[Slide], path: Path) -> None:
     columns = 2
     rows = -(-len(slides) // columns)
     title = 'Probability of each surface while the finger slides (simulated)'
-    with chart(path, (7.2, 1.9 * rows + 0.6), title, points=10.5) as figure:
+    with chart(path, (6.0, 1.9 * rows + 0.6), title) as figure:
         axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
         for axis in axes.ravel()[len(slides) :]:
-            axis.set_visible(False)
+            axis.set_axis_off()
+            axis.text(
+                0.0,
+                0.5,
+                'green: accepted\norange: rejected\ngrey: the other surfaces',
+                transform=axis.transAxes,
+                va='center',
+            )
         for axis, slide in zip(axes.ravel(), slides, strict=False):
             _draw_slide(axis, slide)
         axes[0, 0].set_xlim(0.0, 1.05 * max(slide.answer.texture.evidence_s for slide in slides))

@@ -183,20 +183,22 @@ class Operator:
         """Wait until explorations can be requested; the wait is shown after `quiet_s`."""
         advice = 'start one, such as the emulator with `texture launch emulator`'
         with task(f'waiting for an explorer; {advice}', quiet_s=quiet_s):
-            self._until(self._explore.server_is_ready, deadline_s, f'no explorer answers; {advice}')
+            self.wait_until(self._explore.server_is_ready, deadline_s, f'no explorer answers; {advice}')
 
     def wait_for_node(self, name: str, deadline_s: float) -> None:
         """Wait until a node of the namespace is there."""
         namespace = self._node.get_namespace()
         missing = f"node '{namespace.rstrip('/')}/{name}' was not found; look at its output"
-        self._until(lambda: (name, namespace) in self._node.get_node_names_and_namespaces(), deadline_s, missing)
+        self.wait_until(lambda: (name, namespace) in self._node.get_node_names_and_namespaces(), deadline_s, missing)
 
     def wait_for_signal(self, deadline_s: float) -> None:
         """Wait until the sensor delivers samples."""
         batches: list[msg.TactileSignal] = []
         subscription = self._node.create_subscription(msg.TactileSignal, 'signal', batches.append, SENSOR_QOS)
         try:
-            self._until(lambda: bool(batches), deadline_s, "no samples arrive on 'signal'; is the sensor connected?")
+            self.wait_until(
+                lambda: bool(batches), deadline_s, "no samples arrive on 'signal'; is the sensor connected?"
+            )
         finally:
             self._node.destroy_subscription(subscription)
 
@@ -205,14 +207,10 @@ class Operator:
 
         def all_listen() -> bool:
             guard()
-            return all(self.listeners(topic) >= number for topic in topics)
+            return all(self._node.count_subscribers(topic) >= number for topic in topics)
 
-        self._until(all_listen, LISTENERS_DEADLINE_S, f'no node subscribes to {", ".join(topics)}')
+        self.wait_until(all_listen, LISTENERS_DEADLINE_S, f'no node subscribes to {", ".join(topics)}')
         self._settle()
-
-    def listeners(self, topic: str) -> int:
-        """Return how many subscriptions a topic has."""
-        return int(self._node.count_subscribers(topic))
 
     def explore(
         self, request: ExplorationRequest, on_progress: Progress = lambda _state, _texture: None
@@ -230,7 +228,7 @@ class Operator:
         accepted = self._explore.send_goal_async(action.Explore.Goal(request=to_msg(request)), on_feedback, goal_id)
         silent = 'the explorer accepts no request; stop it, and check that no second one runs'
         try:
-            self._until(accepted.done, ACCEPT_S, silent, MotionAborted)
+            self.wait_until(accepted.done, ACCEPT_S, silent, MotionAborted)
         except MotionAborted as error:
             withdrawn = self._withdraw(goal_id)
             self._executor.spin_until_future_complete(withdrawn, CONFIRM_S)
@@ -287,7 +285,7 @@ class Operator:
         def over() -> bool:
             return any(vector.last and vector.exploration_id == explored.exploration_id for vector in vectors)
 
-        self._until(over, FEATURES_DEADLINE_S, "the features of the slide do not arrive on 'features'")
+        self.wait_until(over, FEATURES_DEADLINE_S, "the features of the slide do not arrive on 'features'")
         return explored, [one for one in vectors if one.exploration_id == explored.exploration_id and not one.last]
 
     def stop(self) -> str:
@@ -349,14 +347,14 @@ class Operator:
             msg.FeatureVector, 'features', lambda message: vectors.append(from_msg(message)), FEATURE_QOS
         )
         missing = "no node publishes on 'features'; is the feature_extractor running?"
-        self._until(lambda: self._node.count_publishers('features') > 0, FEATURES_DEADLINE_S, missing)
+        self.wait_until(lambda: self._node.count_publishers('features') > 0, FEATURES_DEADLINE_S, missing)
         self._settle()
         return vectors
 
     def _settle(self) -> None:
         """Wait until other processes have discovered what this process has."""
         settled_s = time.monotonic() + DISCOVERY_S
-        self._until(lambda: time.monotonic() > settled_s, 2 * DISCOVERY_S, '')
+        self.wait_until(lambda: time.monotonic() > settled_s, 2 * DISCOVERY_S, '')
 
     def _ask_classifier(self, kind: Any, name: str, request: Any) -> Any:
         """Return the answer of a service of the classifier that succeeded."""
@@ -370,9 +368,9 @@ class Operator:
         """Return the answer of a service; the sentences are for one that nobody offers, and one without an answer."""
         client = self._node.create_client(kind, name)
         try:
-            self._until(client.service_is_ready, OFFERED_S, missing)
+            self.wait_until(client.service_is_ready, OFFERED_S, missing)
             future = client.call_async(request)
-            self._until(future.done, ANSWER_S, silent)
+            self.wait_until(future.done, ANSWER_S, silent)
         finally:
             self._node.destroy_client(client)
         return future.result()
@@ -402,22 +400,23 @@ class Operator:
         if node not in self._settings:
             self._settings[node] = AsyncParameterClient(self._node, node)
         client = self._settings[node]
-        self._until(
+        self.wait_until(
             client.services_are_ready, SETTINGS_S, f"no node '{node}' answers; start it, or give its --namespace"
         )
         return client
 
     def _answer(self, node: str, future: Future) -> Any:
         """Return the answer of a node that may run without an explorer."""
-        self._until(future.done, ANSWER_S, f"node '{node}' does not answer")
+        self.wait_until(future.done, ANSWER_S, f"node '{node}' does not answer")
         return future.result()
 
     def _hear(self, _state: bytes) -> None:
         self._heard_s = time.monotonic()
 
-    def _until(
+    def wait_until(
         self, condition: Callable[[], bool], deadline_s: float, complaint: str, error: type[TextureError] = LaunchFailed
     ) -> None:
+        """Wait until a condition holds, or raise the error with the complaint."""
         deadline = time.monotonic() + deadline_s
         with task(f'waiting: {complaint}'):
             while not condition():

@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 
 from texture_core import cli
+from texture_core.cli import Parser, core_count
+from texture_core.errors import TextureError
 
 
 def test_a_long_task_says_how_far_it_is_and_a_nested_or_short_one_nothing(monkeypatch, capsys) -> None:
@@ -38,3 +40,29 @@ def test_a_stop_while_a_node_imports_ends_it_with_0_and_without_a_traceback(numb
     process.send_signal(number)
     assert process.communicate(timeout=30.0) == ('', '')
     assert process.returncode == 0
+
+
+@pytest.mark.parametrize(
+    ('given', 'sentence'),
+    [
+        (
+            ['oak', '--spedd', '1'],
+            "no option of touch '--spedd'; did you mean '--speed'? Known: --help, --jobs, --kind, ",
+        ),
+        (['oak', '--speed', 'fast'], "--speed is 'fast'; a number is needed: speed, 5 % at least"),
+        (['oak', '--jobs', '0'], "--jobs is '0'; 0 cores compute nothing; 1 or more are needed, or -1 for all"),
+        (['oak', '--kind', 'liner'], "no value of --kind 'liner'; did you mean 'linear'? Known: circular, linear"),
+        (['oak', '--speed'], '--speed: expected one argument; write touch [-h] [--speed M/S]'),
+        (['oak', 'elm'], "'elm' is one argument too many; write touch [-h] [--speed M/S]"),
+        ([], 'the following arguments are required: surface; write touch [-h] [--speed M/S]'),
+    ],
+)
+def test_a_mistake_in_an_option_is_answered_with_what_came_and_what_is_allowed(given, sentence) -> None:
+    parser = Parser(prog='touch')
+    parser.add_argument('surface')
+    parser.add_argument('--speed', type=float, metavar='M/S', help='speed, 5 %% at least')
+    parser.add_argument('--jobs', type=core_count)
+    parser.add_argument('--kind', choices=('linear', 'circular'))
+    with pytest.raises(TextureError) as refused:
+        parser.parse_args(given)
+    assert str(refused.value).startswith(sentence)

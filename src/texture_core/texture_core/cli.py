@@ -14,10 +14,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TypeVar
+from typing import Any, NoReturn, TypeVar
 
-from texture_core.config import from_mapping, parameters_of
-from texture_core.errors import TextureError
+from texture_core.config import from_mapping, parameters_of, unknown_name
+from texture_core.errors import InvalidParameter, TextureError
 
 T = TypeVar('T')
 
@@ -29,6 +29,43 @@ class Command:
     summary: str
     configure: Callable[[argparse.ArgumentParser], None]
     run: Callable[[argparse.Namespace], int]
+
+
+NUMBERS: Mapping[Any, str] = {int: 'a whole number', float: 'a number'}
+
+
+class Parser(argparse.ArgumentParser):
+    """Raises an error in a sentence that names what came, what is allowed, and the nearest name."""
+
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Return the values of all options; refuse what is none."""
+        options, more = self.parse_known_args(args, namespace)
+        for word in more:
+            if word.startswith('-'):
+                raise unknown_name(word.partition('=')[0], self._option_string_actions, f'option of {self.prog}')
+            raise InvalidParameter(f"'{word}' is one argument too many; {self._usage()}")
+        return options
+
+    def error(self, message: str) -> NoReturn:
+        """Refuse what argparse refuses, such as a missing argument."""
+        raise InvalidParameter(f'{message.removeprefix("argument ")}; {self._usage()}')
+
+    def _usage(self) -> str:
+        return f'write {" ".join(self.format_usage().split()[1:])}'
+
+    def _get_value(self, action: argparse.Action, arg_string: str) -> Any:
+        try:
+            return super()._get_value(action, arg_string)
+        except argparse.ArgumentError as error:
+            name, needed = '/'.join(action.option_strings) or action.dest, NUMBERS.get(action.type)
+            # A function such as `core_count` has a sentence for what it refuses
+            fault = f'{needed} is needed: {(action.help or "") % vars(action)}' if needed else error.message
+            raise InvalidParameter(f"{name} is '{arg_string}'; {fault}") from None
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is not None and value not in action.choices:
+            name = '/'.join(action.option_strings) or action.dest
+            raise unknown_name(str(value), map(str, action.choices), f'value of {name}')
 
 
 # --------------------

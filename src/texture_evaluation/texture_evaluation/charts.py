@@ -18,8 +18,6 @@ from texture_core.errors import InvalidParameter
 # Okabe & Ito 2008: distinguished by all kinds of colour vision.
 COLOURS = ('#0072B2', '#E69F00', '#009E73', '#CC79A7', '#56B4E9', '#D55E00', '#000000')
 STYLE: Any = {
-    'font.size': 9,
-    'axes.titlesize': 10,
     'axes.titlelocation': 'left',
     'axes.spines.top': False,
     'axes.spines.right': False,
@@ -27,7 +25,9 @@ STYLE: Any = {
     'grid.alpha': 0.3,
     'legend.frameon': False,
 }
-DPI = 130
+DPI = 150
+MARGIN_IN = 0.12  # around a figure
+PHONE_PX, TEXT_PX = 380, 9.2  # the text of a chart that is as wide as the page on a phone
 CHART_FORMATS = ('.png', '.svg', '.pdf')
 
 
@@ -47,20 +47,22 @@ def pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
 
 
 @contextmanager
-def chart(path: str | Path, size: tuple[float, float], title: str = '', points: float = 9.0) -> Iterator[Figure]:
+def chart(path: str | Path, size: tuple[float, float], title: str = '') -> Iterator[Figure]:
     """Give an empty figure, with a title over all its panels if wanted, and save it at the end.
 
+    The size, in inches, determines that of the text: it can be read on a phone, whatever the width of the figure.
     No display is needed and no global state is touched.
     """
+    points = 72.0 * (size[0] + 2 * MARGIN_IN) * TEXT_PX / PHONE_PX
     # Not pyplot, which would keep every figure and need a display.
-    with mpl.rc_context({**STYLE, 'font.size': points, 'axes.titlesize': points + 1.0}):
+    with mpl.rc_context({**STYLE, **dict.fromkeys(('font.size', 'axes.titlesize', 'figure.titlesize'), points)}):
         figure = Figure(figsize=size, layout='constrained')
         FigureCanvasAgg(figure)
         if title:
             figure.suptitle(title, x=0.02, ha='left', fontweight='bold')
         yield figure
         Path(path).parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, dpi=DPI, bbox_inches='tight', pad_inches=0.12)
+        figure.savefig(path, dpi=DPI, bbox_inches='tight', pad_inches=MARGIN_IN)
 
 
 def line_styles() -> Iterator[dict[str, Any]]:

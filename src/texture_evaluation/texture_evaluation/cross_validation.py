@@ -412,7 +412,7 @@ def comparison_chart(results: Sequence[CrossValidation], title: str, path: str |
     -------
     Path
     """
-    with chart(path, (7.0, 5.0 + 0.5 * len(results)), title, points=10.5) as figure:
+    with chart(path, (6.0, 5.0 + 0.5 * len(results)), title) as figure:
         accuracies, times = figure.subplots(2, 1, height_ratios=(1.4 + 0.5 * len(results), 3.6))
         _draw_accuracies(accuracies, results)
         for result, style in zip(results, line_styles(), strict=False):

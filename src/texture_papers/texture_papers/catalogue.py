@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The papers' experiments by name, rebuilt on simulated surfaces."""
+"""The papers' experiments by name, reproduced on simulated surfaces."""
 
 from __future__ import annotations
 

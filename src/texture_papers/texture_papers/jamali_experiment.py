@@ -40,7 +40,7 @@ def findings(outcomes: MethodResults) -> list[Finding]:
             'with three peaks most errors are within a material: carpet 1 and 2, tile 1 and 2',
             three,
             [('carpet_1', 'carpet_2'), ('tile_1', 'tile_2')],
-        ), seldom('vinyl 1 and 2 are hardly taken for each other (2 of 100 with three peaks)', three, VINYLS, 0.05)),
+        ), seldom('vinyl 1 and 2 are rarely confused (2 of 100 with three peaks)', three, VINYLS, 0.05)),
         more_spread('by amplitude, errors go to unlike materials more often', amplitude, three, ALIKE),
     ]  # fmt: skip
 

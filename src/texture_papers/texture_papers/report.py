@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -138,7 +139,7 @@ def figures_chart(
 ) -> Path:
     """Draw the figure of each method: the paper's as a cross, the simulated with its interval."""
     heights = [len(methods) + 1 for methods in panels.values()]
-    with chart(path, (5.4, 1.2 + 0.26 * sum(heights)), title) as figure:
+    with chart(path, (5.4, 1.2 + 0.32 * sum(heights)), title) as figure:
         rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
         for axes, (task, methods) in zip(rows, panels.items(), strict=True):
             _bars(axes, methods, drawn, unit[1])
@@ -158,7 +159,7 @@ def _bars(axes: Any, methods: Mapping[str, tuple[float | None, Interval]], drawn
         (scale * paper, place) for place, (paper, _) in zip(at, methods.values(), strict=True) if paper is not None
     ]
     axes.plot(*zip(*reported, strict=True), 'x', color=COLOURS[5], label='paper') if reported else None
-    axes.set_yticks(at, list(methods))
+    axes.set_yticks(at, [textwrap.fill(name, 26) for name in methods], linespacing=1.0)
     axes.set(ylim=(len(methods) - 0.4, -0.6))
 
 
@@ -167,7 +168,7 @@ SEARCHED = '; the first alone, whose slides for training the search was given'
 
 
 def run(protocol: PaperProtocol, experiment: Experiment) -> ExperimentResult:
-    """Rebuild a paper's experiment on simulated surfaces; with a search, by the recipes that it finds."""
+    """Reproduce a paper's experiment on simulated surfaces; with a search, by the recipes that it finds."""
     scene = load_scene(protocol.scene)
     tuned = searched(protocol, experiment) if experiment.tune else NONE
     found = outcomes(protocol, scene, experiment.seed, quick=experiment.quick, tuned=tuned)

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -182,44 +181,41 @@ def errors_chart(numbers: Mapping[str, Any], out: Path) -> Path:
 
 
 SHADES = {'training': COLOURS[2], 'unseen': COLOURS[0]}  # green and blue as in the paper
+# Of each texture: the human grade, mean and standard deviation of the estimates, and that of the interval.
+ByTexture = Mapping[str, Mapping[str, float | None]]
 
 
-# Of each texture: the human grade, mean and standard deviation of the estimates, and the interval claimed.
-ByTexture = Mapping[str, Mapping[str, float]]
-
-
-def grades_chart(
-    panels: Mapping[str, Mapping[str, ByTexture]], textures: Sequence[str], title: str, path: str | Path
-) -> Path:
-    """Draw the estimates of each texture next to its human grade, a panel for each head (the paper's Fig. 7).
+def grades_chart(panels: Mapping[str, Mapping[str, ByTexture]], path: str | Path) -> Path:
+    """Draw the estimates of each texture next to its human grade, a panel for each regressor (the paper's Fig. 7).
 
     The thick bar is one standard deviation over the windows, the thin one the 90 % interval of a window.
     """
     human = {name: row['human'] for series in panels.values() for one in series.values() for name, row in one.items()}
-    order = sorted(textures, key=lambda name: (human[name], list(textures).index(name)))
+    order = sorted(human, key=lambda texture: human[texture] or 0.0)
     place = {name: index for index, name in enumerate(order)}
-    with chart(
-        path, (0.25 * len(order) + 1.2, 2.6 * len(panels) + 1.4), textwrap.fill(title, 60), points=10.5
-    ) as figure:
-        rows = figure.subplots(len(panels), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
-        for axes, (name, series) in zip(rows, panels.items(), strict=True):
-            axes.scatter(range(len(order)), [human[texture] for texture in order], marker='_', s=90,
+    with chart(path, (5.8, 0.22 * len(order) + 1.6), 'Roughness of simulated textures, people and models') as figure:
+        columns = figure.subplots(1, len(panels), sharex=True, sharey=True, squeeze=False)[0]
+        for axes, (name, series) in zip(columns, panels.items(), strict=True):
+            axes.scatter(list(human.values()), [place[texture] for texture in human], marker='|', s=90,
                          color=COLOURS[5], label='people', zorder=4)  # fmt: skip
             for kind, one in series.items():
                 _grade_bars(axes, one, place, kind)
-            axes.set(title=name, ylabel='grade (1 to 5)', ylim=(0.2, 5.8), yticks=range(1, 6))
-            axes.legend(loc='upper left', ncols=3)
-        rows[-1].set_xticks(range(len(order)), order, rotation=90)
-        rows[-1].set_xlabel('texture, from smooth to rough for people')
+            axes.set(title=name, xlim=(0.2, 5.8), xticks=range(1, 6))
+        columns[0].set_yticks(range(len(order)), [name.replace('_', ' ') for name in order])
+        columns[0].set_ylim(len(order) - 0.4, -0.6)
+        columns[len(columns) // 2].set_xlabel('grade, 1 (smooth) to 5 (rough)')
+        figure.legend(*columns[0].get_legend_handles_labels(), loc='outside lower left', ncols=3)
     return Path(path)
 
 
 def _grade_bars(axes: Any, table: ByTexture, place: Mapping[str, int], kind: str) -> None:
     at = [place[name] for name in table]
-    means, stds, claimed = (np.array([row[name] for row in table.values()]) for name in ('mean', 'std', 'interval_std'))
+    means, stds, claimed = (
+        np.array([row[name] for row in table.values()], dtype=np.float64) for name in ('mean', 'std', 'interval_std')
+    )
     half = NORMAL_90 * claimed
-    axes.errorbar(at, means, yerr=half, fmt='none', color=SHADES[kind], linewidth=0.8, alpha=0.6, zorder=2)
-    axes.errorbar(at, means, yerr=stds, fmt='o', markersize=4, color=SHADES[kind], linewidth=3, alpha=0.85, label=kind,
+    axes.errorbar(means, at, xerr=half, fmt='none', color=SHADES[kind], linewidth=0.8, alpha=0.6, zorder=2)
+    axes.errorbar(means, at, xerr=stds, fmt='o', markersize=4, color=SHADES[kind], linewidth=3, alpha=0.85, label=kind,
                   zorder=3)  # fmt: skip
 
 
@@ -263,7 +259,7 @@ def run(experiment: Experiment) -> ExperimentResult:
         }
         if not experiment.seed and not tuned:  # 25 models of each recipe: of the first seed alone
             answers[name]['left_out'] = _leave_one_out(simulated, recipe)
-    charts = () if experiment.seed or tuned else (_chart(simulated.textures, answers, experiment.out),)
+    grades = {} if experiment.seed or tuned else _grades(answers)
     return ExperimentResult(
         name=f'roughness{"-tuned" if tuned else ""}',
         measured=(
@@ -282,10 +278,11 @@ def run(experiment: Experiment) -> ExperimentResult:
             'one_person': ONE_PERSON,
             'always_the_middle': {part: float(np.abs(3.0 - one.true).mean()) for part, one in answers['ANN1'].items()},
             'regressors': {name: {part: one.figures() for part, one in of.items()} for name, of in answers.items()},
+            'grades': grades,
             'tuning': {name: one.as_json() for name, one in tuned.items()},
             'findings': [finding_as_json(finding) for finding in findings(answers)],
         },
-        charts=charts,
+        charts=(grades_chart(grades, experiment.out / 'roughness_grades.png'),) if grades else (),
     )
 
 
@@ -398,14 +395,17 @@ def _thinned(examples: LabelledFeatures, count: int) -> LabelledFeatures:
     return examples.take(kept)
 
 
-def _chart(textures: Sequence[str], answers: Mapping[str, Mapping[str, Answers]], out: Path) -> Path:
-    panels = {
-        f'{name}: training and unseen textures': {
-            'training': answers[name]['seen'].by_texture(),
-            'unseen': answers[name]['unseen'].by_texture(),
+def _grades(answers: Mapping[str, Mapping[str, Answers]]) -> dict[str, Any]:
+    """Return what the chart shows, by panel and by whether a texture was trained; null where no window got a grade."""
+    panels = {name: {'training': answers[name]['seen'], 'unseen': answers[name]['unseen']} for name in ('ANN5', 'ours')}
+    panels['ours, left out'] = {'unseen': answers['ours']['left_out']}
+    return {
+        panel: {
+            kind: {
+                texture: {key: round(value, 4) if math.isfinite(value) else None for key, value in row.items()}
+                for texture, row in one.by_texture().items()
+            }
+            for kind, one in series.items()
         }
-        for name in ('ANN5', 'ours')
+        for panel, series in panels.items()
     }
-    panels['ours: each texture left out in turn'] = {'unseen': answers['ours']['left_out'].by_texture()}
-    title = f'Roughness as people grade it, and as it is estimated (simulated, {len(textures)} textures)'
-    return grades_chart(panels, textures, title, out / 'roughness_grades.png')

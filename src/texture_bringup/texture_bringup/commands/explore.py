@@ -44,6 +44,7 @@ from texture_exploration.motions import MOTIONS
 from texture_exploration.presets import load_preset
 from texture_features.correction import read_reference
 from texture_features.feature_set import FeatureSet
+from texture_recordings.bags import topics_in
 from texture_recordings.dataset import SlideDataset
 
 T = TypeVar('T')
@@ -275,6 +276,7 @@ def _identify(options: argparse.Namespace) -> int:
 RECIPE = 'default'  # whose features distinguish the places
 FLUSHED_S = 20.0  # within which what was recorded can be read: a recorder may be behind
 RECORDED = ('signal', 'exploration')
+RECORDER_S = 60.0  # to start, on a busy machine
 PATCH = ('patch_x_low_m', 'patch_x_high_m', 'patch_y_low_m', 'patch_y_high_m')
 LEAST_SPEED_M_S = 0.002  # of every explorer
 LIMITS = ('min_force_n', 'max_force_n', 'max_speed_m_s')
@@ -328,21 +330,35 @@ def _evaluate_bag(bag: Path, surface: str, slides: int) -> collection.PlaceAccur
     deadline_s = time.monotonic() + FLUSHED_S
     while True:
         time.sleep(1.0)
-        BAGS_LOG.disabled = True  # the bag that is still recorded has no end yet
+        late = time.monotonic() > deadline_s
         try:
-            dataset = SlideDataset.from_bags([bag.parent], topics=feature_set.topics)
-        finally:
-            BAGS_LOG.disabled = False
+            with unfinished_bags():
+                dataset = SlideDataset.from_bags([bag.parent], topics=feature_set.topics)
+        except InvalidData:  # nothing of the first slides is there yet
+            if late:
+                raise
+            continue
         written = sum(one.bag == bag for one in dataset)
-        if written >= slides or time.monotonic() > deadline_s:
+        if written >= slides or late:
             return collection.evaluate_places(dataset.features(feature_set), surface)
 
 
 @contextmanager
+def unfinished_bags() -> Iterator[None]:
+    """Read bags that are still recorded, without the warning that they have no end."""
+    BAGS_LOG.disabled = True
+    try:
+        yield
+    finally:
+        BAGS_LOG.disabled = False
+
+
+@contextmanager
 def recorder(operator: Operator, bag: Path, namespace: str) -> Iterator[Callable[[], None]]:
-    """Record a bag in a separate process; the function raises InvalidData, with its last message, if that ended."""
-    operator.wait_for_listeners(RECORDED, 1, lambda: None)  # the feature extractor; by then all others are found
-    wanted = {topic: operator.listeners(topic) + 1 for topic in RECORDED}
+    """Record a bag in a separate process, once it writes what the nodes send.
+
+    The function raises InvalidData, with the last message of the recorder, if that ended.
+    """
     arguments = ['record', str(bag), '--namespace', namespace]
     with tempfile.TemporaryDirectory() as log, Child(arguments, os.environ, Path(log) / 'record.log') as child:
 
@@ -350,9 +366,18 @@ def recorder(operator: Operator, bag: Path, namespace: str) -> Iterator[Callable
             if child.end:
                 raise InvalidData(f'the recorder ended: {child.end}')
 
-        for topic, number in wanted.items():
-            operator.wait_for_listeners((topic,), number, check)
+        operator.wait_until(
+            lambda: records(bag, check), RECORDER_S, f'{" and ".join(RECORDED)} do not reach the recorder'
+        )
         yield check
+
+
+def records(bag: Path, check: Callable[[], None]) -> bool:
+    """Return whether a bag that is being recorded holds all of `RECORDED`: the idle explorer reports once a second."""
+    check()
+    with unfinished_bags(), suppress(InvalidData):  # nothing is written yet
+        return set(RECORDED) <= {name.rpartition('/')[2] for name in topics_in(bag)}
+    return False
 
 
 # Parameters whose options are shorter; both numbers of a range follow one option.
