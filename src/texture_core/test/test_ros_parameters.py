@@ -141,7 +141,7 @@ def test_a_file_with_a_wrong_layout_is_refused_in_one_sentence(tmp_path: Path, c
     line = said(capfd, *words)
     assert words[1] in line
     assert "below it 'ros__parameters:'" in line
-    with pytest.raises(InvalidParameter, match="robot.yaml.*below it 'ros__parameters:'"):
+    with pytest.raises(InvalidParameter, match=r"robot\.yaml.*below it 'ros__parameters:'"):
         check_parameter_file(Path(words[1]))
 
 

@@ -353,7 +353,9 @@ def load_yaml(path: Path, what: str) -> Any:
         raise InvalidParameter(f"{what} '{path}' is not YAML that can be read: {error}") from error
 
 
-PARAMETER_FILE = "a parameter file holds 'NODE:', below it 'ros__parameters:', below it 'NAME: VALUE', each two spaces in"
+PARAMETER_FILE = (
+    "a parameter file holds 'NODE:', below it 'ros__parameters:', below it 'NAME: VALUE', each two spaces in"
+)
 
 
 def check_parameter_file(path: Path) -> None:
