@@ -322,7 +322,7 @@ def test_the_diagnostics_count_what_happened(world):
 def test_parameters_are_checked_before_the_arm_is_looked_for(given, sentence):
     arm = {'arm': 'ros_controllers', 'accept_no_timeout': True, 'accept_shared_group': True, 'connect_timeout_s': 0.5}
     with NodeProcess('texture_exploration', 'explorer', {**arm, **given}) as explorer:
-        assert explorer.wait(DEADLINE_S) == 2
+        assert explorer.wait(3 * DEADLINE_S) == 2
         [line] = explorer.output.splitlines()
     assert sentence in line
 
