@@ -3,8 +3,10 @@
 import threading
 import time
 from contextlib import ExitStack, contextmanager
+from functools import partial
 
 import pytest
+import rclpy
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.context import Context
 from rclpy.executors import MultiThreadedExecutor
@@ -12,7 +14,8 @@ from rclpy.node import Node
 from texture_msgs import action
 
 from texture_bringup import operator as operators
-from texture_core.errors import MotionAborted
+from texture_core.errors import LaunchFailed, MotionAborted
+from texture_core.ros_testing import LocalGraph
 from texture_core.types import ExplorationRequest
 
 # An explorer that answers at the end finds nobody there any more.
@@ -63,6 +66,14 @@ def test_an_explorer_that_says_nothing_although_ros_lists_it_is_given_up_within_
         ):
             operator.explore(ExplorationRequest('linear_slide'))
         assert time.monotonic() - begin_s < 7.0
+
+
+def test_a_wrong_namespace_is_named_with_those_that_have_an_explorer():
+    with LocalGraph(DOMAIN) as graph, operators.Operator('lefft', DOMAIN) as operator:
+        for namespace in ('left', 'right'):
+            graph.add(partial(rclpy.create_node, 'explorer', namespace=namespace))
+        with pytest.raises(LaunchFailed, match=r"in the namespace '/lefft' .* explorers in /left, /right"):
+            operator.wait_for_explorer(5.0)
 
 
 def test_an_explorer_that_was_started_again_is_not_waited_for(monkeypatch):

@@ -92,6 +92,14 @@ def test_a_real_robot_comes_without_anything_emulated(robot):
 
 
 @pytest.mark.parametrize('robot', ROBOTS)
+def test_with_a_mapping_the_adaptor_takes_the_place_of_the_sensor(robot):
+    given = {'emulated': 'false', 'mapping': 'biotac_sensors', 'mapping_finger': '2'}
+    nodes = {node.executable: node for node in read(find_launch_file(robot), given, {})}
+    assert nodes.keys() == {'explorer', 'adaptor', 'feature_extractor', 'classifier'}
+    assert given_to(nodes['adaptor']) == {'mapping': 'biotac_sensors', 'finger': 2}
+
+
+@pytest.mark.parametrize('robot', ROBOTS)
 def test_a_parameter_file_of_the_explorer_has_the_last_word(robot, tmp_path):
     file = tmp_path / 'my_robot.yaml'
     file.touch()

@@ -28,6 +28,7 @@ import yaml
 from texture_core.config import (
     PARSE_ERRORS,
     FileRefused,
+    check_parameter_file,
     executable,
     find,
     find_file,
@@ -648,4 +649,5 @@ class _Reader:
             if path.parts[-4:-1] == ('texture_bringup', 'config', 'robots'):
                 raise unknown_name(path.stem, [item.stem for item in path.parent.glob('*.yaml')], 'preset')
             raise InvalidLaunch(f"there is no parameter file '{path}'; give the path of one")
+        check_parameter_file(path)
         return path

@@ -182,8 +182,20 @@ class Operator:
     def wait_for_explorer(self, deadline_s: float, quiet_s: float | None = None) -> None:
         """Wait until explorations can be requested; the wait is shown after `quiet_s`."""
         advice = 'start one, such as the emulator with `texture launch emulator`'
-        with task(f'waiting for an explorer; {advice}', quiet_s=quiet_s):
-            self.wait_until(self._explore.server_is_ready, deadline_s, f'no explorer answers; {advice}')
+        ours = self._node.get_namespace()
+        try:
+            with task(f"waiting for an explorer in the namespace '{ours}'; {advice}", quiet_s=quiet_s):
+                self.wait_until(self._explore.server_is_ready, deadline_s, f'no explorer answers; {advice}')
+        except LaunchFailed as error:
+            others = {space for name, space in self._node.get_node_names_and_namespaces() if name == 'explorer'} - {
+                ours
+            }
+            if not others:
+                raise
+            raise LaunchFailed(
+                f"no explorer answers in the namespace '{ours}' (waited {deadline_s:.0f} s); there are explorers in "
+                f'{", ".join(sorted(others))}: give one as --namespace'
+            ) from error
 
     def wait_for_node(self, name: str, deadline_s: float) -> None:
         """Wait until a node of the namespace is there."""

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import pytest
 import rclpy
 from rclpy.parameter import Parameter
 
-from texture_core.config import param
+from texture_core.config import check_parameter_file, param
 from texture_core.errors import InvalidParameter
 from texture_core.ros import check_names, declare, on_change, read, run
 from texture_core.ros_testing import LocalGraph
@@ -86,6 +87,62 @@ def test_a_node_that_shares_the_file_of_another_takes_what_it_knows_and_says_not
     assert declare(node, Params).name == 'y'
     check_names(node)
     assert not capfd.readouterr().err
+
+
+def start(*words: str) -> None:
+    """Run a node called 'n' with the words of a command line, until its parameters are checked."""
+
+    def n() -> Any:
+        node = rclpy.create_node('n')
+        raise InvalidParameter(f'it starts with {declare(node, Params)}')
+
+    run(n, ['--ros-args', *words])
+
+
+def said(capfd: Any, *words: str) -> str:
+    with pytest.raises(SystemExit) as ended:
+        start(*words)
+    assert ended.value.code == 2
+    [line] = capfd.readouterr().err.splitlines()
+    return str(line)
+
+
+def write(path: Path, text: str) -> tuple[str, str]:
+    path.write_text(text)
+    return '--params-file', str(path)
+
+
+PRESET = '/**:\n  ros__parameters: {name: x}\n/**/n:\n  ros__parameters: {length_s: 5.0}\n'
+
+
+@pytest.mark.parametrize(('section', 'value'), [('/**', '3.0'), ('/**/n', '3'), ('n', '3')])
+def test_the_last_file_counts_whatever_its_section_and_however_the_number_is_written(
+    tmp_path: Path, capfd: Any, section: str, value: str
+) -> None:
+    preset = write(tmp_path / 'preset.yaml', PRESET)
+    robot = write(tmp_path / 'robot.yaml', f'{section}:\n  ros__parameters: {{length_s: {value}}}\n')
+    assert 'length_s=3.0' in said(capfd, *preset, *robot)
+    assert 'length_s=2.0' in said(capfd, *preset, *robot, '-p', 'length_s:=2')
+
+
+@pytest.mark.parametrize('value', ['8.0N', '"8.0"', 'true', '6,5'])
+def test_a_mistyped_value_is_refused_in_any_order_of_files(tmp_path: Path, capfd: Any, value: str) -> None:
+    preset = write(tmp_path / 'preset.yaml', PRESET)
+    robot = write(tmp_path / 'robot.yaml', f'/**/n:\n  ros__parameters:\n    length_s: {value}\n')
+    for words in ((*preset, *robot), (*robot, *preset)):
+        line = said(capfd, *words)
+        assert f"{robot[1]}': parameter 'length_s' is " in line
+        assert 'a number is needed, 0.01 to 10.0 s' in line
+
+
+@pytest.mark.parametrize('text', ['n:\n  length_s: 8.0\n', 'n:\n  ros__parameters:\n\tlength_s: 8.0\n', 'length_s\n'])
+def test_a_file_with_a_wrong_layout_is_refused_in_one_sentence(tmp_path: Path, capfd: Any, text: str) -> None:
+    words = write(tmp_path / 'robot.yaml', text)
+    line = said(capfd, *words)
+    assert words[1] in line
+    assert "below it 'ros__parameters:'" in line
+    with pytest.raises(InvalidParameter, match=r"robot\.yaml.*below it 'ros__parameters:'"):
+        check_parameter_file(Path(words[1]))
 
 
 @pytest.mark.parametrize('section', ['/**', '/n', '/**/n'])

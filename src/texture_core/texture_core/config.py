@@ -353,6 +353,28 @@ def load_yaml(path: Path, what: str) -> Any:
         raise InvalidParameter(f"{what} '{path}' is not YAML that can be read: {error}") from error
 
 
+PARAMETER_FILE = (
+    "a parameter file holds 'NODE:', below it 'ros__parameters:', below it 'NAME: VALUE', each two spaces in"
+)
+
+
+def check_parameter_file(path: Path) -> None:
+    """Refuse a file that ROS cannot read as parameters of nodes."""
+
+    def fits(section: Any) -> bool:
+        if not isinstance(section, Mapping):
+            return False
+        inner = section.get('ros__parameters', section)
+        return isinstance(inner, Mapping) and (inner is not section or all(map(fits, section.values())))
+
+    try:
+        content = load_yaml(path, 'parameter file')
+    except InvalidParameter as error:
+        raise InvalidParameter(f'{" ".join(str(error).split())}; {PARAMETER_FILE}') from error
+    if content is not None and not fits(content):
+        raise InvalidParameter(f"parameter file '{path}' gives no parameters to a node; {PARAMETER_FILE}")
+
+
 def load_card(path: Path) -> Any:
     """Return the value of `recipe` in a model card (JSON)."""
     try:
@@ -471,7 +493,8 @@ class Parameter:
         if self.type is float and isinstance(value, int) and not isinstance(value, bool):
             value = float(value) if abs(value) <= sys.float_info.max else math.inf
         if not isinstance(value, self.type) or (self.type is not bool and isinstance(value, bool)):
-            raise InvalidParameter(f"parameter '{self.name}' is {safe_repr(value)}; {NOUNS[self.type]} is needed")
+            allowed = ', '.join(filter(None, (f'{NOUNS[self.type]} is needed', self.range_text)))
+            raise InvalidParameter(f"parameter '{self.name}' is {safe_repr(value)}; {allowed}")
         self._check_range(value)
         return value
 

@@ -16,6 +16,8 @@ import time
 import typing
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import pairwise
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -29,7 +31,6 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.duration import Duration
-from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.executors import (
     Executor,
     ExternalShutdownException,
@@ -37,6 +38,7 @@ from rclpy.executors import (
     SingleThreadedExecutor,
     TimeoutException,
 )
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -44,7 +46,7 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Header
 from texture_msgs import msg
 
-from texture_core.config import Parameter, from_mapping, parameters_of, unknown_name
+from texture_core.config import Parameter, check_parameter_file, from_mapping, parameters_of, unknown_name
 from texture_core.errors import InvalidParameter, TextureError
 from texture_core.types import (
     DATA_CLASSES,
@@ -149,23 +151,43 @@ TYPES = {
     list[float]: RosParameter.Type.DOUBLE_ARRAY,
 }
 UNBOUNDED = 1e300
+SOURCES = ('--params-file', '--param', '-p')
+_SOURCES: list[tuple[str, str]] = []  # those of this process, with their text
 
 
 def declare(node: Any, cls: type[T], *, changeable: bool = False) -> T:
     """Declare every field of `cls` with its description, unit and range; return the values of the node."""
+    if not hasattr(node, 'given'):
+        node.given = _given(node)
     for item in parameters_of(cls):
         if node.has_parameter(item.name):
             continue
-        given = node._parameter_overrides.get(item.name)
-        if item.type is float and given is not None and given.type_ is RosParameter.Type.INTEGER:
-            node._parameter_overrides[item.name] = RosParameter(item.name, value=float(given.value))
-        try:
-            node.declare_parameter(item.name, item.default, _descriptor(item, read_only=not changeable))
-        except (InvalidParameterTypeException, InvalidParameterValueException) as error:
-            raise InvalidParameter(
-                f"parameter '{item.name}' of node '{node.get_name()}' was refused: {error}; {_needed(item)}"
-            ) from error
+        for source, values in node.given:  # each is checked, the last one counts
+            if item.name in values:
+                try:
+                    value = item.check(values[item.name].value)
+                except InvalidParameter as error:
+                    raise InvalidParameter(f"node '{node.get_name()}', {source}: {error}") from error
+                node._parameter_overrides[item.name] = RosParameter(item.name, TYPES[item.type], value)
+        node.declare_parameter(item.name, item.default, _descriptor(item, read_only=not changeable))
     return read(node, cls)
+
+
+def _given(node: Any) -> list[tuple[str, Mapping[str, RosParameter]]]:
+    """Return the parameters in each file and `-p` of the command line, or those that the constructor got.
+
+    One by one: ROS joins them by section, where a later file does not replace an earlier one whose section comes later,
+    or whose value has another type, such as 15.0 before 'high'.
+    """
+    given = []
+    for option, text in _SOURCES:
+        with node.context.handle:
+            alone = rclpy_implementation.Node(
+                node.get_name(), node.get_namespace(), node.context.handle, ['--ros-args', option, text], False, False
+            )
+        given.append((f"'{option} {text}'", alone.get_parameters(RosParameter)))
+        alone.destroy_when_not_in_use()
+    return given or [('its constructor', dict(node._parameter_overrides))]
 
 
 def read(node: Any, cls: type[T]) -> T:
@@ -215,10 +237,7 @@ def check_names(node: Any) -> None:
                 'if it belongs to another node, give it in the section of that node'
             )
         node.get_logger().warning(f'this has no effect: {unknown_name(name, declared, "parameter")}')
-
-
-def _needed(item: Parameter) -> str:
-    return f'{TYPES[item.type].name.lower()} {item.range_text}'.strip() + ' is needed'
+        del node._parameter_overrides[name]  # said once
 
 
 def _descriptor(item: Parameter, *, read_only: bool) -> ParameterDescriptor:
@@ -295,7 +314,7 @@ def run(
     on_stop
         Called in the signal's handler, also while the node is still being made: a wait for a device ends then.
     """
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    _SOURCES[:] = [pair for pair in pairwise(sys.argv if args is None else args) if pair[0] in SOURCES]
     stopped = threading.Event()
 
     def stop(_number: int, _frame: Any) -> None:
@@ -307,6 +326,10 @@ def run(
             signal.signal(number, stop)
     node = executor = None
     try:
+        for option, text in _SOURCES:
+            if option == '--params-file':
+                check_parameter_file(Path(text))
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = make_node()
         check_names(node)
         executor = make_executor()

@@ -312,6 +312,21 @@ def test_the_diagnostics_count_what_happened(world):
     assert 0.0 <= float(numbers()['arm_state_age_s']) < DEADLINE_S
 
 
+@pytest.mark.parametrize(
+    ('given', 'sentence'),
+    [
+        ({'max_forc_n': 8.0}, "has no parameter 'max_forc_n'; did you mean 'max_force_n'?"),
+        ({'max_force_n': '6,5'}, "'max_force_n' is '6,5'; a number is needed, 0.01 to 50.0 N"),
+    ],
+)
+def test_parameters_are_checked_before_the_arm_is_looked_for(given, sentence):
+    arm = {'arm': 'ros_controllers', 'accept_no_timeout': True, 'accept_shared_group': True, 'connect_timeout_s': 0.5}
+    with NodeProcess('texture_exploration', 'explorer', {**arm, **given}) as explorer:
+        assert explorer.wait(3 * DEADLINE_S) == 2
+        [line] = explorer.output.splitlines()
+    assert sentence in line
+
+
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGHUP, signal.SIGQUIT, signal.SIGTERM])
 def test_a_signal_that_ends_the_process_in_the_slide_lifts_the_finger_and_answers_first(graph, tmp_path, number):
     signal.signal(signal.SIGHUP, signal.SIG_DFL)  # under nohup it is ignored, and a node would inherit that

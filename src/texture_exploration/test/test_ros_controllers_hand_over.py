@@ -9,6 +9,7 @@ import socket
 import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
 import pytest
 from geometry_msgs.msg import PoseStamped, TwistStamped
@@ -19,6 +20,7 @@ from texture_exploration.arms.ros_controllers import RosControllersArm
 from texture_exploration.arms.tool_state import RosControllersParams
 from texture_exploration.ros import controllers as controller_topics
 from texture_exploration.ros import guard as guard_process
+from texture_exploration.ros.controllers import node_of
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
@@ -198,3 +200,10 @@ def test_when_the_process_that_commands_is_killed_or_stopped_its_guard_brings_th
             process.kill()
     record_property('gone_m', x_m() - end_m)
     assert x_m() - end_m < 0.005  # without a guard it never comes to rest
+
+
+def test_a_publisher_whose_node_is_not_discovered_yet_is_not_named_as_dds_does():
+    known = SimpleNamespace(node_namespace='/left', node_name='other')
+    unknown = SimpleNamespace(node_namespace='_NODE_NAMESPACE_UNKNOWN_', node_name='_NODE_NAME_UNKNOWN_')
+    assert node_of(known) == "'/left/other'"
+    assert 'not discovered yet (wait some seconds and try again;' in node_of(unknown)

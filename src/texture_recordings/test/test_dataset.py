@@ -15,12 +15,15 @@ from texture_recordings.slides import STREAMS, LabelledSlide, find_slides, parse
 pytestmark = pytest.mark.ros
 
 
-def write(path: Path, surfaces: list[str], start_s: int) -> Path:
+SLID = (Phase.APPROACH, Phase.SLIDE, Phase.DONE)
+
+
+def write(path: Path, surfaces: list[str], start_s: int, phases: tuple[Phase, ...] = SLID) -> Path:
     with BagWriter(path) as bag:
         for count, surface in enumerate(surfaces):
             stamp_ns = (start_s + 10 * count) * NANOSECONDS
             name = f'{path.stem}/{count}'
-            for step, phase in enumerate((Phase.APPROACH, Phase.SLIDE, Phase.DONE)):
+            for step, phase in enumerate(phases):
                 state = ExplorationState(stamp_ns + step, name, 'linear_slide', phase, surface=surface)
                 bag.write('exploration', state, stamp_ns + step)
             samples = np.full((1, 1), count, dtype=np.float32)
@@ -70,6 +73,17 @@ def test_unlabelled_slides_are_left_out_and_a_bag_without_labels_is_refused(tmp_
     assert len(find_slides([write(tmp_path / 'some', ['', 'cork'], start_s=0)])) == 1
     with pytest.raises(InvalidData, match='is labelled'):
         find_slides([write(tmp_path / 'none', ['', ''], start_s=0)])
+
+
+@pytest.mark.parametrize('surfaces', [[], ['cork', 'felt']])
+def test_bags_of_explorations_that_were_refused_or_aborted_before_their_slide_are_named_so(
+    tmp_path: Path, surfaces: list[str]
+) -> None:
+    bag = write(tmp_path / 'aborted', surfaces, start_s=0, phases=(Phase.APPROACH, Phase.ABORTED))
+    with BagWriter(bag.with_name('idle')) as idle:
+        idle.write('exploration', ExplorationState(1, '', '', Phase.IDLE), 1)
+    with pytest.raises(InvalidData, match=r"came to its slide: .* ends with 'the motion was completed'"):
+        find_slides([bag.with_name('idle'), *([bag] if surfaces else [])])
 
 
 def test_slides_that_no_surface_has_are_refused(tmp_path: Path) -> None:

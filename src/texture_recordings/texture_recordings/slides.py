@@ -241,6 +241,12 @@ def find_slides(
             logging.getLogger(__name__).warning("the bag '%s' has no labelled slide, so nothing is taken from it", path)
         labelled += slides_of_bag
     if not labelled:
+        states = [state for path in paths for _, _, state in read_bag(path, (EXPLORATION,), namespace)]
+        if not any(state.phase is Phase.SLIDE for state in states):
+            raise InvalidData(
+                f'no exploration in {_named(paths)} came to its slide: each was refused or aborted before; record '
+                "again, and keep what ends with 'the motion was completed'"
+            )
         raise InvalidData(
             f"no slide in {_named(paths)} is labelled; give the surface's name with each exploration you record"
         )

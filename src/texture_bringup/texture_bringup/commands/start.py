@@ -49,6 +49,7 @@ LOOKED_AT = {
     'classifier': ('texture_estimation.model', 'load_model', 'model'),
     'roughness_estimator': ('texture_estimation.roughness', 'load_roughness_model', 'model'),
     'feature_extractor': ('texture_features.feature_set', 'FeatureSet.load', 'recipe'),
+    'adaptor': ('texture_drivers.adaptor', 'load_mapping', 'mapping'),
     'replay': ('texture_recordings.bags', 'bags_in', 'bag'),
 }
 

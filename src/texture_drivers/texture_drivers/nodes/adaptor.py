@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from texture_msgs import msg
 
@@ -113,4 +114,4 @@ class Adaptor(Node):
 
 def main() -> None:
     """Run the node."""
-    run(Adaptor)
+    run(Adaptor, make_executor=SingleThreadedExecutor)  # the EventsExecutor fails at callbacks with two arguments

@@ -44,6 +44,7 @@ from texture_core.ros import (
     Diagnostics,
     PatientLifecycleNode,
     WaitingExecutor,
+    check_names,
     declare,
     frame_name,
     from_msg,
@@ -157,6 +158,7 @@ class ExplorerNode(PatientLifecycleNode):
         self.create_timer(IDLE_PERIOD_S, self._publish_idle)
         Diagnostics(self, self._report)
         self._publish_idle()
+        check_names(self)  # before the arm is taken
         if self._autostart:
             self.trigger_configure()
             self.trigger_activate()

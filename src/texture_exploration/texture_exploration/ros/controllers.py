@@ -172,8 +172,7 @@ class RosTopics:
         """Return in a sentence another commander, '' if there is none; `ours` are the participants of this explorer."""
         for info in self._node.get_publishers_info_by_topic(self._topic):
             if sender(info) not in ours:
-                name = f'{info.node_namespace.rstrip("/")}/{info.node_name}'
-                return f"'{name}' also commands the arm: it publishes on '{self._topic}'"
+                return f"{node_of(info)} also commands the arm: it publishes on '{self._topic}'"
         return ''
 
     def close(self) -> None:
@@ -188,6 +187,13 @@ class RosTopics:
         rclpy.try_shutdown(context=self._context)
         if self._lock >= 0:
             os.close(self._lock)
+
+
+def node_of(info: Any) -> str:
+    """Return the node of a publisher, as a sentence names it."""
+    if info.node_name == '_NODE_NAME_UNKNOWN_':  # as DDS calls it
+        return 'a node that is not discovered yet (wait some seconds and try again; `ros2 topic info -v` shows it)'
+    return f"'{info.node_namespace.rstrip('/')}/{info.node_name}'"
 
 
 def _refuse_unguarded(params: RosControllersParams) -> None:
