@@ -6,12 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from texture_benchmarks.catalogue import BENCHMARKS
+from texture_benchmarks.catalogue import BENCHMARKS, run_benchmark
 from texture_benchmarks.generalisation import generalisation_chart
 from texture_benchmarks.overview import computing_chart, sliding_chart
 from texture_benchmarks.scenes import ablation_chart
+from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult
 from texture_benchmarks.trust import failures_chart
 from texture_bringup.command import main
+from texture_evaluation.charts import REDUCED, chart
 
 pytestmark = pytest.mark.ros
 
@@ -38,6 +40,21 @@ def test_every_benchmark_has_its_line_on_the_page_and_make_runs_some() -> None:
 def test_the_charts_of_the_pages_can_be_drawn_from_the_stored_figures(name, draw, tmp_path: Path) -> None:
     numbers = json.loads((PAGES / 'charts' / f'{name}.json').read_text(encoding='utf-8'))['numbers']
     assert draw(numbers, tmp_path / 'chart.png').is_file()
+
+
+@pytest.mark.parametrize('quick', [True, False])
+def test_the_json_and_the_picture_of_a_quick_run_are_marked(quick: bool, tmp_path: Path, monkeypatch) -> None:
+    def drawn(options: BenchmarkOptions) -> BenchmarkResult:
+        with chart(options.out / 'chart.svg', (3.0, 3.0)) as figure:
+            texts = figure.texts
+        return BenchmarkResult('slides', 'halves', {'texts': [one.get_text() for one in texts]})
+
+    monkeypatch.setitem(BENCHMARKS, 'scale', drawn)
+    _, path = run_benchmark('scale', BenchmarkOptions(tmp_path, quick=quick))
+    written = json.loads(path.read_text())
+    assert written['numbers']['texts'] == ([REDUCED] if quick else [])
+    assert written.get('reduced', '') == (REDUCED if quick else '')
+    assert written['split'] == (f'{REDUCED}; part of: halves' if quick else 'halves')
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,18 @@ STYLE: Any = {
 }
 DPI = 130
 CHART_FORMATS = ('.png', '.svg', '.pdf')
+REDUCED = 'REDUCED, not for publishing'
+is_reduced = ContextVar('is_reduced', default=False)  # whether what runs has fewer slides than its published figures
+
+
+@contextmanager
+def reduced_run(*, quick: bool) -> Iterator[None]:
+    """Mark each chart and JSON that is made within a `with` block, if `quick`."""
+    before = is_reduced.set(quick)
+    try:
+        yield
+    finally:
+        is_reduced.reset(before)
 
 
 def refuse_chart_format(path: str | Path) -> None:
@@ -58,6 +71,8 @@ def chart(path: str | Path, size: tuple[float, float], title: str = '', points: 
         FigureCanvasAgg(figure)
         if title:
             figure.suptitle(title, x=0.02, ha='left', fontweight='bold')
+        if is_reduced.get():
+            figure.text(0.5, 0.5, REDUCED, color='red', fontsize=16, rotation=30, ha='center', va='center')
         yield figure
         Path(path).parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(path, dpi=DPI, bbox_inches='tight', pad_inches=0.12)
