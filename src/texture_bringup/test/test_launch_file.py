@@ -51,7 +51,7 @@ def test_while_the_files_of_a_launch_are_checked_it_says_so(tmp_path: Path, monk
     cli.show_progress()
     monkeypatch.setattr(cli, 'QUIET_S', 0.0)
     replay = NodeDescription('texture_recordings', 'replay', parameters=({'bag': str(tmp_path)},))
-    with pytest.raises(InvalidData, match='no bag'):
+    with pytest.raises(InvalidData, match='is not a bag'):
         refuse_wrong([replay], {str(tmp_path)})
     assert capsys.readouterr().err.startswith('check the files that the launch names, ')
 

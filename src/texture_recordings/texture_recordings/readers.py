@@ -51,7 +51,7 @@ class TableFrame:
     lines: AnyArray | None = None  # number in the file of each row
     junk: AnyArray | None = None  # rows with something that is no number
     reasons: Sequence[str] = ()  # of the first such rows
-    gaps: int = 0  # rows with a condition that is no number
+    gaps: AnyArray | None = None  # rows with a condition that is no number
     gap_reasons: Sequence[str] = ()
 
     def __getitem__(self, name: str) -> AnyArray:
@@ -161,7 +161,7 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
     """
     form, parts = mapping.format, list[dict[str, AnyArray]]()
     lines, junk, reasons = list[AnyArray](), list[AnyArray](), list[str]()
-    n_gaps, gap_reasons = 0, list[str]()
+    gapped, gap_reasons = list[AnyArray](), list[str]()
     with open_regular(path) as opened:
         # The names of the columns, and those that the mapping wants as numbers.
         rest = _lines(opened, form)
@@ -208,7 +208,7 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
             left = sorted(gaps.keys() - bad.keys())
             reasons += [f'row {numbered[row]}, {bad[row]}' for row in sorted(bad)[: EXAMPLES - len(reasons)]]
             gap_reasons += [f'row {numbered[row]}, {gaps[row]}' for row in left[: EXAMPLES - len(gap_reasons)]]
-            n_gaps += len(left)
+            gapped.append(np.isin(np.arange(len(rows)), left))
             lines.append(np.array(numbered))
             junk.append(np.isin(np.arange(len(rows)), list(bad)))
             parts.append(part)
@@ -220,8 +220,9 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
     last = np.maximum.accumulate(np.where(marked, np.argmin(marked), np.arange(len(marked))))
     columns = {name: column[last] if column.dtype.kind == 'O' else column for name, column in columns.items()}
     yield TableFrame(
-        place, columns, lines=np.concatenate(lines), junk=marked, reasons=reasons, gaps=n_gaps, gap_reasons=gap_reasons
-    )
+        place, columns, lines=np.concatenate(lines), junk=marked, reasons=reasons, gaps=np.concatenate(gapped),
+        gap_reasons=gap_reasons,
+    )  # fmt: skip
 
 
 def _wanted(mapping: TableMapping, names: Sequence[str]) -> tuple[set[str], set[str]]:

@@ -306,6 +306,7 @@ class FrameSlides:
             lines = np.arange(len(mask)) if frame.lines is None else frame.lines
             frame = replace(
                 frame, lines=lines[mask], junk=None if frame.junk is None else frame.junk[mask],
+                gaps=None if frame.gaps is None else frame.gaps[mask],
                 columns={key: one[mask] if one.shape == mask.shape else one for key, one in frame.columns.items()},
             )  # fmt: skip
         return frame
@@ -392,9 +393,9 @@ class FrameSlides:
     def _check_malformed(self) -> None:
         """Count malformed rows of streams and cells of conditions; InvalidData if they are too many."""
         frame, faults = self._frame, list[tuple[str, int, int, Sequence[str]]]()
-        if frame.gaps:
-            rows = next(iter(self._malformed))
-            faults.append(('rows with a condition that is no number', frame.gaps, rows, frame.gap_reasons))
+        if frame.gaps is not None and frame.gaps.any():
+            count, length = int(frame.gaps.sum()), len(frame.gaps)
+            faults.append(('rows with a condition that is no number', count, length, frame.gap_reasons))
         for length, bad in self._malformed.items():
             count = int(bad.sum())
             first = f'row {self._line(int(bad.argmax()))}, no finite number' if count else 'no row at all'
