@@ -114,4 +114,4 @@ def write_csv(folder: Path, recorded: list[Recording], broken: dict[int, str] | 
 if __name__ == '__main__':
     # As they come from a logger: a bad cell, a line that is no row, and materials that are hard to distinguish.
     broken = {60: '5000600.00;stroke 1;oops;1.0;2.0;150.0', 400: 'logger restarted'}
-    write_csv(Path(sys.argv[1]), recordings(files=4, noise=1.0, spread=0.25), broken)
+    write_csv(Path(sys.argv[1]), recordings(files=8, noise=1.0, spread=0.25), broken)

@@ -359,7 +359,7 @@ def recipes(root: Path) -> str:
         windows = recipe.get('windows', {})
         cells = [
             f'[{path.stem}](../../{path.relative_to(root)})',
-            f'{windows.get("length_s", "–")} s, {windows.get("hop_s", "–")} s',
+            ', '.join(f'{round(windows[key], 4)} s' if key in windows else '– s' for key in ('length_s', 'hop_s')),
             ', '.join(f'`{name}`' for name in recipe.get('inputs', {})),
             _name(recipe.get('learner')),
             _name(recipe.get('evidence')),

@@ -67,9 +67,9 @@ def test_the_page_shows_what_the_import_prints(output: str) -> None:
 def test_a_reader_ends_with_figures_charts_and_a_file(output: str) -> None:
     for name in ('figure.png', 'figures.json', 'slides.parquet'):
         assert Path(name).stat().st_size > 200, name
-    assert "'mine' against 'default' on 36 slides" in output
-    assert '36 (250, 3)' in output
-    assert "36 ['cork_thick', 'linen', 'oak board']" in output
+    assert "'mine' against 'default' on 72 slides" in output
+    assert '72 (250, 3)' in output
+    assert "72 ['cork_thick', 'linen', 'oak board']" in output
 
 
 @pytest.mark.parametrize('text', BLOCK.findall(REFERENCE))

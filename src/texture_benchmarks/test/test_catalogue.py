@@ -9,12 +9,14 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from PIL import Image
 
-from texture_benchmarks.catalogue import BENCHMARKS
+from texture_benchmarks.catalogue import BENCHMARKS, run_benchmark
 from texture_benchmarks.generalisation import generalisation_chart
 from texture_benchmarks.overview import computing_chart, sliding_chart
 from texture_benchmarks.scenes import ablation_chart
+from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult
 from texture_benchmarks.trust import failures_chart
 from texture_bringup.command import main
+from texture_evaluation.charts import REDUCED, chart
 
 pytestmark = pytest.mark.ros
 
@@ -54,6 +56,21 @@ def test_the_charts_of_the_pages_can_be_read_on_a_phone_and_drawn_from_the_store
     with Image.open(path) as picture:
         width_in = picture.width / picture.info['dpi'][0]
     assert min(sizes) / 72 / width_in * 380 >= 9, 'text below 9 pixels on a phone'
+
+
+@pytest.mark.parametrize('quick', [True, False])
+def test_the_json_and_the_picture_of_a_quick_run_are_marked(quick: bool, tmp_path: Path, monkeypatch) -> None:
+    def drawn(options: BenchmarkOptions) -> BenchmarkResult:
+        with chart(options.out / 'chart.svg', (3.0, 3.0)) as figure:
+            texts = figure.texts
+        return BenchmarkResult('slides', 'halves', {'texts': [one.get_text() for one in texts]})
+
+    monkeypatch.setitem(BENCHMARKS, 'scale', drawn)
+    _, path = run_benchmark('scale', BenchmarkOptions(tmp_path, quick=quick))
+    written = json.loads(path.read_text())
+    assert written['numbers']['texts'] == ([REDUCED] if quick else [])
+    assert written.get('reduced', '') == (REDUCED if quick else '')
+    assert written['split'] == (f'{REDUCED}; part of: halves' if quick else 'halves')
 
 
 @pytest.mark.parametrize(

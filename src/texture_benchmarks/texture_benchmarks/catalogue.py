@@ -5,12 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from pathlib import Path
 
 from texture_benchmarks import generalisation, latency, learning, motion, overview, papers, scale, scenes, trust
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult
 from texture_core.config import find
+from texture_evaluation.charts import reduced_run
 
 BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
     'latency': latency.run,  # from window to estimate, in one process and through the graph; computing time
@@ -29,7 +29,6 @@ BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
 def run_benchmark(name: str, options: BenchmarkOptions) -> tuple[BenchmarkResult, Path]:
     """Run one study; return its result and the JSON file, with the charts next to it."""
     run = find(BENCHMARKS, name, 'benchmark')
-    result = run(options)
-    if options.quick:
-        result = replace(result, data=f'REDUCED, not for publishing; part of: {result.data}')
-    return result, result.write(options.out, name, run.__doc__)
+    with reduced_run(quick=options.quick):
+        result = run(options)
+        return result, result.write(options.out, name, run.__doc__)

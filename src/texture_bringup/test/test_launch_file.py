@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from texture_bringup.commands.start import refuse_wrong
 from texture_bringup.launcher import (
     NodeDescription,
     command,
@@ -14,7 +15,8 @@ from texture_bringup.launcher import (
     read,
     typed,
 )
-from texture_core.errors import InvalidLaunch, UnknownName
+from texture_core import cli
+from texture_core.errors import InvalidData, InvalidLaunch, UnknownName
 from texture_drivers.catalogue import SENSORS
 from texture_simulation.emulator import LIVE_SENSORS
 
@@ -43,6 +45,15 @@ def test_an_argument_has_its_default_until_one_is_given(launch) -> None:
     elements = '<arg name="who" default="$(env HOME)"/><node pkg="p" exec="e" name="$(var who)"/>'
     assert launch(elements)[0].name == '/home/me'
     assert launch(elements, who='you')[0].name == 'you'
+
+
+def test_while_the_files_of_a_launch_are_checked_it_says_so(tmp_path: Path, monkeypatch, capsys) -> None:
+    cli.show_progress()
+    monkeypatch.setattr(cli, 'QUIET_S', 0.0)
+    replay = NodeDescription('texture_recordings', 'replay', parameters=({'bag': str(tmp_path)},))
+    with pytest.raises(InvalidData, match='is not a bag'):
+        refuse_wrong([replay], {str(tmp_path)})
+    assert capsys.readouterr().err.startswith('check the files that the launch names, ')
 
 
 GIVEN = 'if="$(not-equals \'m$(var model)\' m)"'

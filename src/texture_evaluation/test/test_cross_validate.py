@@ -338,6 +338,35 @@ def test_a_comparison_counts_the_slides_that_the_one_alone_recognises() -> None:
     assert 0.0 < low < 0.6 < high <= 1.0
 
 
+def test_the_test_decides_where_the_interval_of_the_bootstrap_is_narrower() -> None:
+    """Four slides of twelve are correct by the second recipe only: p = 2 / 2⁴."""
+    one = compare(cross_validation('a', [True] * 8 + [False] * 4), cross_validation('b', [True] * 12))
+    assert one.slide_interval[0] > 0.0
+    assert sentence(one).endswith('p = 0.12 (exact McNemar test, which decides: no difference is shown)')
+    clear = compare(cross_validation('a', [False] * 8), cross_validation('b', [True] * 8))
+    assert sentence(clear).endswith('p = 0.0078 (exact McNemar test, which decides: a difference is shown)')
+
+
+def test_folds_with_too_little_training_say_so_and_have_no_figures_of_acceptance() -> None:
+    result = cross_validate(RECIPE, tones(), ChronologicalSplit())
+    lines = table(result, 'chronological')
+    needed = '1 of 1 folds reject every label: too little training: '
+    assert lines[-1].startswith(needed)
+    assert result.as_json()['too_little_training'] == lines[-1]
+    assert lines[2].split()[-2:] == ['–', '–']
+    assert 'accepted' not in lines[4]
+    assert (result.as_json()['accepted_wrong'], result.as_json()['accepted_wrong_interval']) == (None, None)
+
+
+def test_progress_counts_the_folds(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = []
+    monkeypatch.setattr(
+        'texture_evaluation.cross_validation.progress', lambda done, *what: seen.append(what) or list(done)
+    )
+    result = cross_validate(RECIPE, tones(), LeaveOneGroupOut(), groups='speed')
+    assert seen == [(f"cross-validate '{RECIPE.name}', folds", len(result.folds))]
+
+
 def test_slides_of_one_place_are_one_case_of_the_test() -> None:
     first, second = (cross_validation(name, [right] * 8) for name, right in (('a', False), ('b', True)))
     assert compare(first, second).p_value == pytest.approx(2 / 2**8)

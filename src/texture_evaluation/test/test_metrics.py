@@ -102,6 +102,18 @@ def test_rejections_are_counted_by_their_reason_on_screen_and_in_the_figures() -
     assert 'slides rejected at the end: 2 novel, 1 outside training' in summary(report)
 
 
+def test_each_line_names_the_slides_that_it_counts() -> None:
+    known = [slide('a', 'a'), slide('a', 'b'), slide('a', 'a', known=False), slide('b', 'b', decided_from=0)]
+    unknown = [slide('x', 'a', known=False)] * 4
+    lines = summary(EvaluationReport(('a', 'b'), known, unknown, np.ones(4), unusable=('x/1',)))
+    of = 'of the 4 slides over trained surfaces'
+    assert f'{of}, at the end: accepted and correct 50.0 %, accepted but wrong 25.0 %, rejected 25.0 %' in lines
+    assert f'{of}, once decided: accepted but wrong 0.0 %, rejected 25.0 %' in lines
+    assert 'of the 4 slides over other surfaces: accepted 0.0 %; slides rejected at the end: 4 novel' in lines
+    assert lines[-1].startswith('1 slides are not counted, as each window ')
+    assert lines[-1].endswith(': x/1')
+
+
 def test_both_lists_of_labels_are_named_where_no_tested_surface_was_trained() -> None:
     slides, few = (
         [slide('felt', 'a'), slide('cork', 'a', known=False)],
@@ -110,6 +122,6 @@ def test_both_lists_of_labels_are_named_where_no_tested_surface_was_trained() ->
     report = EvaluationReport(('a', 'b'), [], slides, np.ones(2), too_little_training=few)
     lines = summary(report)
     assert 'no tested surface was trained, so there is no accuracy: trained are a, b; tested are cork, felt' in lines
-    assert 'slides over other surfaces accepted: 50.0 %' in lines
+    assert 'of the 2 slides over other surfaces: accepted 50.0 %; slides rejected at the end: 1 novel' in lines
     assert lines[-1] == report.as_json()['too_little_training'] == few
     assert (report.as_json()['tested'], report.as_json()['rejections_of_untrained']) == (['cork', 'felt'], {'novel': 1})

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,18 @@ DPI = 150
 MARGIN_IN = 0.12  # around a figure
 PHONE_PX, TEXT_PX = 380, 9.2  # the text of a chart that is as wide as the page on a phone
 CHART_FORMATS = ('.png', '.svg', '.pdf')
+REDUCED = 'REDUCED, not for publishing'
+is_reduced = ContextVar('is_reduced', default=False)  # whether what runs has fewer slides than its published figures
+
+
+@contextmanager
+def reduced_run(*, quick: bool) -> Iterator[None]:
+    """Mark each chart and JSON that is made within a `with` block, if `quick`."""
+    before = is_reduced.set(quick)
+    try:
+        yield
+    finally:
+        is_reduced.reset(before)
 
 
 def refuse_chart_format(path: str | Path) -> None:
@@ -60,6 +73,8 @@ def chart(path: str | Path, size: tuple[float, float], title: str = '') -> Itera
         FigureCanvasAgg(figure)
         if title:
             figure.suptitle(title, x=0.02, ha='left', fontweight='bold')
+        if is_reduced.get():
+            figure.text(0.5, 0.5, REDUCED, color='red', fontsize=16, rotation=30, ha='center', va='center')
         yield figure
         Path(path).parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(path, dpi=DPI, bbox_inches='tight', pad_inches=MARGIN_IN)

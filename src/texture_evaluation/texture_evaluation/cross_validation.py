@@ -20,6 +20,7 @@ from scipy.stats import binomtest
 from sklearn.model_selection import GroupShuffleSplit, LeaveOneGroupOut, StratifiedGroupKFold
 from threadpoolctl import threadpool_limits
 
+from texture_core.cli import progress
 from texture_core.config import library, unknown_name
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.types import AnyArray, Array
@@ -265,10 +266,22 @@ class CrossValidation:
         """Results of all test slides of all folds."""
         return [result for fold in self.folds for result in fold.results.values()]
 
+    @property
+    def too_little_training(self) -> str:
+        """How many folds reject every label, and why the first does, in one sentence; '' if none does."""
+        reasons = [fold.model.acceptance.reason for fold in self.folds if fold.model.acceptance.reason]
+        return f'{len(reasons)} of {len(self.folds)} folds reject every label: {reasons[0]}' if reasons else ''
+
     def figures(self, folds: Sequence[FoldResult]) -> dict[str, Any]:
-        """Return the figures of folds together, with intervals over clusters; see the function `figures`."""
+        """Return the figures of folds together, with intervals over clusters; see the function `figures`.
+
+        Those of acceptance are None where all folds reject every label.
+        """
         named = [item for fold in folds for item in fold.results.items()]
-        return figures([result for _, result in named], [self.clusters.get(name, name) for name, _ in named])
+        found = figures([result for _, result in named], [self.clusters.get(name, name) for name, _ in named])
+        if all(fold.model.acceptance.reason for fold in folds):
+            found |= dict.fromkeys(key for key in found if key.startswith('accepted_'))
+        return found
 
     def as_json(self) -> dict[str, Any]:
         """Return the pooled figures, those of each fold, all with 95 % intervals, and the label of each test slide.
@@ -280,6 +293,7 @@ class CrossValidation:
             'feature_set': self.folds[0].model.feature_set,
             'version': version('texture_evaluation'),
             'shift': self.shift,
+            'too_little_training': self.too_little_training,
             **self.figures(self.folds),
             'labels': list(self.labels),
             'confusion': metrics.confusion(self.pooled, self.labels).tolist(),
@@ -652,10 +666,11 @@ def cross_validate(
     further = recipe.augmentation.copies or recipe.training.slowest_m_s
     if recipe.training_windows != recipe.feature_set.windows or further:
         trained = training_examples(recipe, dataset)
-    folds = Parallel(n_jobs=n_jobs)(
+    done = Parallel(n_jobs=n_jobs, return_as='generator')(
         delayed(_fold)(recipe, trained.of_slides(train), tested.of_slides(test), train, name)
         for train, test, name in named
     )
+    folds = list(progress(done, f"cross-validate '{recipe.name}', folds", len(named)))
     usable = set(tested.groups.tolist())
     shift = SHIFTS.get(groups, SAME_TRACK) if isinstance(groups, str) else 'other group'
     of_slides = shift == SAME_TRACK

@@ -62,6 +62,7 @@ class EvaluationReport:
         """Return the figures; null where there is no slide."""
         nothing = {'accuracy': None, 'mean_s': None}
         median, p99 = np.percentile(self.latency_us, (50, 99))
+        wrong, rejected = metrics.accepted_wrong(self.known), metrics.rejected(self.known)
         return {
             'shift': self.shift,
             'trained_on': list(self.trained_on),
@@ -74,8 +75,8 @@ class EvaluationReport:
             'tested': self.tested,
             'confusion': self.confusion.tolist(),
             'latency_us': {'median': float(median), 'p99': float(p99)},
-            'accepted_wrong': metrics.accepted_wrong([*self.known, *self.unknown]),
-            'rejected': metrics.rejected([*self.known, *self.unknown]),
+            'once_decided': {'accepted_wrong': wrong['early'], 'rejected': rejected['early']},
+            'rejected': rejected['final'],
             'rejections_of_untrained': metrics.rejections(self.unknown),
         }
 
@@ -167,7 +168,8 @@ def run_model(
 
 def _test(model: TextureModel, slide: LabelledSlide, events: Sequence[WindowEvent]) -> tuple[SlideResult, Array]:
     """Return the estimate for each usable window of a slide, and the computing times of all."""
-    vectors, estimates, taken_us = run_model(model, events)
+    # By the processor's clock: the machine may be busy.
+    vectors, estimates, taken_us = run_model(model, events, time.process_time)
     used, received, before = [], [], 0
     for vector, estimate in zip(vectors, estimates, strict=True):
         if not vector.last and vector.feature_set != model.feature_set:
@@ -189,8 +191,11 @@ def _test(model: TextureModel, slide: LabelledSlide, events: Sequence[WindowEven
 # The figures of an evaluation as text.
 
 
+LEVEL = 0.05  # of significance
+
+
 def sentence(one: PairedComparison) -> str:
-    """Return a comparison in words."""
+    """Return a comparison in words: intervals by bootstrap are too narrow for few clusters, so the test decides."""
     slides, windows = (
         f'{100 * value:+.1f} points ({100 * low:+.1f} to {100 * high:+.1f})'
         for value, (low, high) in (
@@ -204,7 +209,7 @@ def sentence(one: PairedComparison) -> str:
     return (
         f"'{one.second}' against '{one.first}' on {one.n_slides} slides: slides {slides}, windows {windows}; "
         f'{one.only_second} slides are correct by it only, {one.only_first} by the other only: '
-        f'p = {one.p_value:.2g} ({test})'
+        f'p = {one.p_value:.2g} ({test}, which decides: {"a" if one.p_value < LEVEL else "no"} difference is shown)'
     )
 
 
@@ -240,15 +245,22 @@ def table(result: CrossValidation, split: str) -> list[str]:
     if result.untested:
         names = ', '.join(f"'{surface}' ({count} slides)" for surface, count in result.untested.items())
         lines.append(f'trained but not tested, as no other slide would train them: {names}')
-    if result.unusable:
-        lines.append(f'without a usable window, and not counted: {", ".join(result.unusable)}')
-    return lines
+    return [*lines, *_unusable(result.unusable), *filter(None, [result.too_little_training])]
+
+
+def _unusable(slides: Sequence[str]) -> list[str]:
+    """Return a line on slides that were not counted, if there are any."""
+    why = 'not counted, as each window lacks samples, has some that are NaN, or is longer than the slide'
+    return [f'{len(slides)} slides are {why}: {", ".join(slides)}'] if slides else []
 
 
 def by_reason(rejections: Mapping[str, int]) -> str:
     """Return how many slides were rejected for each reason, in words."""
     counts = ', '.join(f'{count} {reason.replace("_", " ")}' for reason, count in rejections.items())
     return f'slides rejected at the end: {counts or "none"}'
+
+
+ENDS = {'accepted and correct': 'accepted_correct', 'accepted but wrong': 'accepted_wrong', 'rejected': 'rejected'}
 
 
 def summary(report: EvaluationReport) -> list[str]:
@@ -277,25 +289,24 @@ def summary(report: EvaluationReport) -> list[str]:
         f'as soon as decided: accuracy {percent(early["accuracy"])}, after {early["mean_s"]:.2f} s on average'
         if any(estimate.decided and estimate.accepted for result in report.known for estimate in result.estimates)
         else 'as soon as decided: never decided',
-        f'computing time of a window: {latency["median"]:.0f} µs median, {latency["p99"]:.0f} µs 99th percentile',
+        f'processor time of a window: {latency["median"]:.0f} µs median, {latency["p99"]:.0f} µs 99th percentile',
     ]
-    wrong, rejected = figures['accepted_wrong'], figures['rejected']
-    lines += [
-        f'accepted but wrong: {percent(wrong["early"])} once decided, {percent(wrong["final"])} at the end; '
-        f'rejected: {percent(rejected["early"])}, {percent(rejected["final"])}',
-        by_reason(figures['rejections']),
-    ]
-    if figures['unknown_accepted'] is not None:
-        lines.append(f'slides over other surfaces accepted: {percent(figures["unknown_accepted"])}')
-        lines.append(f'of other surfaces, {by_reason(figures["rejections_of_untrained"])}')
+    if report.known:
+        end, soon = (
+            ', '.join(f'{name} {percent(of[key])}' for name, key in ENDS.items() if key in of)
+            for of in (figures, figures['once_decided'])
+        )
+        of = f'of the {len(report.known)} slides over trained surfaces'
+        lines += [f'{of}, at the end: {end}', f'{of}, once decided: {soon}', by_reason(figures['rejections'])]
+    if report.unknown:
+        accepted, rejected = percent(figures['unknown_accepted']), by_reason(figures['rejections_of_untrained'])
+        lines.append(f'of the {len(report.unknown)} slides over other surfaces: accepted {accepted}; {rejected}')
     if report.trained_on:
         lines.append(
             f'{len(report.trained_on)} of {len(report.known)} slides were in the training, so these figures are '
             'optimistic; leave them out with --slides'
         )
-    if report.unusable:
-        lines.append(f'without a usable window, and not counted: {", ".join(report.unusable)}')
-    return [*lines, *report.tare_faults, *filter(None, [report.too_little_training])]
+    return [*lines, *_unusable(report.unusable), *report.tare_faults, *filter(None, [report.too_little_training])]
 
 
 def percent(fraction: float | None) -> str:

@@ -13,6 +13,7 @@ import pytest
 from texture_core.errors import InvalidParameter
 from texture_estimation.learners.sklearn_learner import SklearnPredictor
 from texture_estimation.recipe import load_recipe
+from texture_evaluation.charts import REDUCED
 from texture_papers import report
 from texture_papers.catalogue import EXPERIMENTS, PROTOCOLS, run_experiment
 from texture_papers.jamali import MeanAmplitude
@@ -91,6 +92,17 @@ def few_show_the_direction_of_what_is_large(name: str, findings: list[dict[str, 
             assert finding['interval'][0] * value > 0, finding['claim']
             large += 1
     return large
+
+
+def test_a_quick_run_is_marked_in_its_json_and_its_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    result, path = run_experiment('hu', Experiment(tmp_path, quick=True))
+    written = json.loads(path.read_text())
+    assert written['reduced'] == REDUCED
+    assert written['split'].startswith(f'{REDUCED}; part of: ')
+    assert written['split'].endswith('; here 33 of 50 slides train')
+    reds = [(matplotlib.image.imread(chart)[..., :3] @ [1.0, -0.5, -0.5] > 0.9).sum() for chart in result.charts]
+    assert min(reds) > 100
+    assert 'reduced' not in json.loads(result.write(tmp_path / 'whole').read_text())
 
 
 @pytest.mark.benchmark

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from texture_core.config import find
 from texture_core.errors import InvalidParameter
+from texture_evaluation.charts import reduced_run
 from texture_papers import hu_experiment, jamali_experiment, kaboli_experiment, rispal_experiment, roberge_experiment
 from texture_papers.protocol import Experiment, ExperimentResult, with_seeds
 from texture_papers.report import charts_of, digests, run
@@ -60,13 +61,14 @@ def run_experiment(name: str, experiment: Experiment, seeds: int = 1) -> tuple[E
         raise InvalidParameter(
             f"experiment '{name}' has nothing to tune: its paper searches for no parameters; leave --tune out"
         )
-    first, *others = [run_of(replace(experiment, seed=experiment.seed + number)) for number in range(seeds)]
-    if others:
-        first = replace(first, numbers=with_seeds(first.numbers, [one.numbers for one in others]))
-    charts = list(first.charts)
-    if name in PROTOCOLS and not experiment.tune:
-        charts.append(charts_of(PROTOCOLS[name], first.numbers, name, experiment.out))
-    elif name == 'roughness' and others and not experiment.tune:
-        charts.append(rispal_experiment.errors_chart(first.numbers, experiment.out))
-    result = replace(first, charts=tuple(charts))
-    return result, result.write(experiment.out)
+    with reduced_run(quick=experiment.quick):
+        first, *others = [run_of(replace(experiment, seed=experiment.seed + number)) for number in range(seeds)]
+        if others:
+            first = replace(first, numbers=with_seeds(first.numbers, [one.numbers for one in others]))
+        charts = list(first.charts)
+        if name in PROTOCOLS and not experiment.tune:
+            charts.append(charts_of(PROTOCOLS[name], first.numbers, name, experiment.out))
+        elif name == 'roughness' and others and not experiment.tune:
+            charts.append(rispal_experiment.errors_chart(first.numbers, experiment.out))
+        result = replace(first, charts=tuple(charts))
+        return result, result.write(experiment.out)

@@ -31,6 +31,7 @@ from texture_core.types import AnyArray, Array
 from texture_estimation.learners.learner import Codes, of_examples
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.roughness import load_roughness_recipe
+from texture_evaluation.charts import REDUCED, is_reduced
 from texture_papers.roberge import UNDECIDED, decided_by_slide, fitted_predictor
 from texture_papers.search import QUICK, Found, SearchParams, Tuned, search, tuned_pairs
 from texture_papers.slides import Mask, Slides, Visits, gather, kinds_of
@@ -341,11 +342,13 @@ class ExperimentResult:
     def write(self, out: Path) -> Path:
         """Write the JSON and return its path."""
         out.mkdir(parents=True, exist_ok=True)
+        part_of = f'{REDUCED}; part of: ' if is_reduced.get() else ''
         content = {
             'name': self.name,
+            **({'reduced': REDUCED} if is_reduced.get() else {}),
             'measured': self.measured,
-            'data': self.data,
-            'split': self.split,
+            'data': part_of + self.data,
+            'split': part_of + self.split,
             'machine': machine(),
             'numbers': self.numbers,
             'charts': [chart.name for chart in self.charts],

@@ -173,6 +173,8 @@ def run(protocol: PaperProtocol, experiment: Experiment) -> ExperimentResult:
     tuned = searched(protocol, experiment) if experiment.tune else NONE
     found = outcomes(protocol, scene, experiment.seed, quick=experiment.quick, tuned=tuned)
     methods = {task.name: [m for m in task.methods if (task.name, m.name) in found] for task in protocol.tasks}
+    trained_on = next(iter(found.values())).trained_on  # (n_splits, n_slides)
+    here = f'; here {trained_on[0].sum()} of {trained_on.shape[1]} slides train'
     slides = {task: _slides(found[task, some[0].name]) for task, some in methods.items()}
     for (task, method), one in tuned.items():
         one.write(experiment.out / f'{method}{TUNED}-{task.replace(" ", "-")}-{experiment.seed}.yaml')
@@ -183,11 +185,10 @@ def run(protocol: PaperProtocol, experiment: Experiment) -> ExperimentResult:
             f"simulated: scene '{scene.name}' ({scene.about}); "
             f'slides a surface: {", ".join(f"{count} ({name})" for name, count in slides.items())}'
         ),
-        split=f'{protocol.split}{SEARCHED if tuned else ""}',
+        split=f'{protocol.split}{SEARCHED if tuned else ""}{here if experiment.quick else ""}',
         numbers={
             'seed': experiment.seed,
             'digests': digests(protocol, tuned=experiment.tune),
-            **({'reduced': True} if experiment.quick else {}),
             'difficulty': _difficulty(protocol, found, tuned=experiment.tune),
             'tasks': {
                 task: {m.name: figures_of(m, found[task, m.name], by_condition=protocol.by_condition) for m in some}

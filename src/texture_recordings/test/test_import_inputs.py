@@ -313,6 +313,11 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
         csv(T, X, [f'12:00:{int(t):02d}' for t in T], names='t,x,wall'), {},
         "'wall': it changes from '12:00:00' to '12:00:01'.*or take all as one signal by rows: ",
     ),
+    'conditions of another sensor that are no numbers': (
+        csv(np.repeat(T, 2), np.ravel(np.c_[X, Y]), ['a', 'b'] * N, [1.0, '-'] * N, names='t,x,id,f'),
+        {'rows': {'id': 'a'}, 'conditions': {'force': {'column': 'f', 'unit': 'N'}}}, CORK,
+    ),
+    'an empty file': (text(''), {}, "' is empty, or has comments only"),
     'seconds': (csv(T, X, (T + 1_700_000_000.4).astype(int), names='t,x,sec'), {}, "'sec': it changes from '17"),
     **{f'column of {name}': (csv(T, X, cells, names='t,x,y'), {}, CORK) for name, cells in UNUSED.items()},
     'all codes at once': (

@@ -77,9 +77,9 @@ def test_malformed_rows_are_counted_and_named_by_file_row_and_column(tmp_path: P
         FIRST_STROKE + 30: '5000700.00;stroke 1;1.0;1.0;2.0;nan',
     }
     report = run(tmp_path, mapping, broken)
-    assert report.left_out == {'malformed rows': 2 * 6}
+    assert report.left_out == {'malformed rows, NaN where they are in a slide': 2 * 6}
     # Two lines stand above the first row, and lines count from 1.
-    assert report.examples['malformed rows'] == [
+    assert report.examples['malformed rows, NaN where they are in a slide'] == [
         "'2031-05-01, cork_thick, v20.csv', row 53, column 'acc_x': 'oops' is not a finite number",
         "'2031-05-01, cork_thick, v20.csv', row 63, column 'all': 1 cells, 6 are needed",
         "'2031-05-01, linen, v20.csv', row 53, column 'acc_x': 'oops' is not a finite number",
@@ -87,6 +87,28 @@ def test_malformed_rows_are_counted_and_named_by_file_row_and_column(tmp_path: P
     assert sum(report.slides.values()) == 18  # a malformed row does not end a slide
     samples, _ = SlideDataset.from_bags([tmp_path / 'out']).to_numpy()
     assert np.isnan(samples[0]).any(axis=1).nonzero()[0].tolist() == [10, 20]
+    header, row = report.lines()[:2]
+    assert row[header.index('NaN') :].split()[0] == '4'
+    assert report.lines()[4].endswith('; 6 slides have NaN samples, and windows with one are unusable')
+
+
+def test_a_cell_of_a_condition_that_is_no_number_leaves_out_that_cell_only(tmp_path: Path) -> None:
+    broken = {FIRST_STROKE + row: f'5000{400 + 10 * row}.00;stroke 1;1.0;1.0;2.0;{cell}'
+              for row, cell in enumerate(('', 'nan', '-', '#N/A', 'inf', 'oops'))}  # fmt: skip
+    report = run(tmp_path, mapping_of(tmp_path), broken)
+    assert report.left_out == {'rows with a condition that is no number': 4 * 6}
+    assert report.examples['rows with a condition that is no number'][0].endswith(
+        "row 45, column 'grip': '-' is not a finite number"
+    )
+    samples, _ = SlideDataset.from_bags([tmp_path / 'out']).to_numpy()
+    assert all(np.isfinite(one).all() for one in samples)
+    assert report.conditions['linen', 'force'][0] == pytest.approx(150 * 9.80665e-3, rel=0.01)
+
+
+def test_a_condition_of_which_over_a_tenth_are_no_numbers_is_refused(tmp_path: Path) -> None:
+    broken = {row: f'{5000000 + 10 * row}.00;stroke 1;1.0;1.0;2.0;150,0' for row in range(100)}
+    with pytest.raises(InvalidData, match=r"100 rows with a condition .* of 910, first row 3.*decimal: ','"):
+        run(tmp_path, mapping_of(tmp_path), broken)
 
 
 def test_a_row_of_units_within_a_slide_is_malformed_and_ends_none(tmp_path: Path) -> None:
@@ -94,7 +116,7 @@ def test_a_row_of_units_within_a_slide_is_malformed_and_ends_none(tmp_path: Path
     any_phase = mapping_of(tmp_path, ('values: [stroke 1, stroke 2, stroke 3]', "values: ['[!r]*', '']"))
     report = run(tmp_path, any_phase, broken)
     assert report.slides == {'linen': 6, 'oak board': 6, 'cork_thick': 6}
-    assert report.left_out == {'malformed rows': 6}
+    assert report.left_out == {'malformed rows, NaN where they are in a slide': 6}
 
 
 def test_losses_and_rows_whose_times_contradict_each_other_are_counted(tmp_path: Path, mapping: TableMapping) -> None:

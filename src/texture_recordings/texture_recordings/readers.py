@@ -51,6 +51,8 @@ class TableFrame:
     lines: AnyArray | None = None  # number in the file of each row
     junk: AnyArray | None = None  # rows with something that is no number
     reasons: Sequence[str] = ()  # of the first such rows
+    gaps: AnyArray | None = None  # rows with a condition that is no number
+    gap_reasons: Sequence[str] = ()
 
     def __getitem__(self, name: str) -> AnyArray:
         """Return a column; UnknownName with the nearest if there is none."""
@@ -153,11 +155,13 @@ NUMERIC = 0.9  # share of numbers in a column of numbers
 def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:
     """Yield the columns of a text file: numbers where the mapping wants them or nine of ten cells are some, or texts.
 
-    A row is malformed if it has other cells than the first one, or a text in a column whose numbers the mapping uses.
-    A word in another column of numbers is refused, as rows of units and means have one.
+    A row is malformed if it has other cells than the first one, or a text in a column of samples or times. Such a text
+    in a column of a condition alone leaves out that cell. A word in another column of numbers is refused, as rows of
+    units and means have one.
     """
     form, parts = mapping.format, list[dict[str, AnyArray]]()
     lines, junk, reasons = list[AnyArray](), list[AnyArray](), list[str]()
+    gapped, gap_reasons = list[AnyArray](), list[str]()
     with open_regular(path) as opened:
         # The names of the columns, and those that the mapping wants as numbers.
         rest = _lines(opened, form)
@@ -165,8 +169,7 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
         rest = rest if form.header else chain([first], rest)
         delimiter = form.delimiter or next((one for one in DELIMITERS if one in first[1]), ',')
         names = _names(_cells(first[1], delimiter), form)
-        numbers = {name for one in mapping.streams.values() for name in chosen(one.columns, names)}
-        numbers |= {*mapping.numbers()}
+        numbers, conditions = _wanted(mapping, names)
         numeric: dict[str, bool] = {}
         # Block by block: the cells, what they are, and the rows that are malformed.
         for block in iter(lambda: list(islice(rest, BLOCK_ROWS)), []):
@@ -179,7 +182,8 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
                 bad.setdefault(len(rows) - 1, "column 'all': the line has no end, so it may have been cut off")
             whole = [[''] * len(names) if row in bad else cells for row, cells in enumerate(rows)]
             part: dict[str, AnyArray] = {}
-            words: dict[int, str] = {}  # in unused columns of numbers
+            # By row: the unused column of numbers with a word, and the first condition that is no number.
+            words, gaps = dict[int, str](), dict[int, str]()
             for name, cells in zip(names, zip(*whole, strict=True), strict=True):
                 text = name in mapping.texts()
                 if not text or name in numbers:
@@ -187,41 +191,69 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
                     values = np.array([number_of(cell) for cell in points])
                     text |= not numeric.setdefault(name, name in numbers or np.isfinite(values).mean() > NUMERIC)
                 for row in np.flatnonzero(np.isnan(values)).tolist() if numeric.get(name) else ():
-                    if name in numbers and cells[row].lower() not in BLANK:
+                    if name in conditions and cells[row].lower() not in BLANK:
+                        gaps.setdefault(row, _reason(name, cells[row], form))
+                    elif name in numbers and cells[row].lower() not in BLANK:
                         bad.setdefault(row, _reason(name, cells[row], form))
                     elif row not in bad and WORD.search(cells[row]) and cells[row].lower() not in NO_WORD:
                         words[row] = name
-                if not text:
-                    _refuse_commas(name, cells, form, delimiter)
+                _refuse_commas(name, () if text else cells, form, delimiter)
                 part[name] = _texts(cells) if text else values
-            for row in bad:
-                if {*rows[row]} & {*names}:
-                    raise InvalidData(
-                        f'row {block[row][0]}: the names of the columns come again, {", ".join(rows[row][:5])}, so '
-                        'another recording may begin there; split the file there'
-                    )
-            if unlike := sorted(words.keys() - bad.keys()):
-                name = words[unlike[0]]
-                raise InvalidData(
-                    f"row {block[unlike[0]][0]}, column '{name}': a word in a column of numbers that no key uses: the "
-                    f"row may be one of units or means; remove it, or read texts there by rows: {{{name!r}: '*'}}"
-                )
-            reasons += [f'row {block[row][0]}, {bad[row]}' for row in sorted(bad)[: EXAMPLES - len(reasons)]]
-            lines.append(np.array([number for number, _ in block]))
+            numbered = [number for number, _ in block]
+            _refuse_other_rows(
+                names,
+                {numbered[row]: rows[row] for row in bad},
+                {numbered[row]: words[row] for row in sorted(words.keys() - bad.keys())},
+            )
+            left = sorted(gaps.keys() - bad.keys())
+            reasons += [f'row {numbered[row]}, {bad[row]}' for row in sorted(bad)[: EXAMPLES - len(reasons)]]
+            gap_reasons += [f'row {numbered[row]}, {gaps[row]}' for row in left[: EXAMPLES - len(gap_reasons)]]
+            gapped.append(np.isin(np.arange(len(rows)), left))
+            lines.append(np.array(numbered))
             junk.append(np.isin(np.arange(len(rows)), list(bad)))
             parts.append(part)
     if not parts:
         raise InvalidData('it has no rows below the names of its columns; choose files with samples')
     columns = {name: np.concatenate([part[name] for part in parts]) for name in names}
-    marked, numbered = np.concatenate(junk), np.concatenate(lines)
+    marked = np.concatenate(junk)
     # A malformed row ends no slide: it has the texts of the one before.
     last = np.maximum.accumulate(np.where(marked, np.argmin(marked), np.arange(len(marked))))
     columns = {name: column[last] if column.dtype.kind == 'O' else column for name, column in columns.items()}
-    yield TableFrame(place, columns, lines=numbered, junk=marked, reasons=reasons)
+    yield TableFrame(
+        place, columns, lines=np.concatenate(lines), junk=marked, reasons=reasons, gaps=np.concatenate(gapped),
+        gap_reasons=gap_reasons,
+    )  # fmt: skip
+
+
+def _wanted(mapping: TableMapping, names: Sequence[str]) -> tuple[set[str], set[str]]:
+    """Return the columns that the mapping wants as numbers, and those of them that are of a condition alone."""
+    samples = {name for one in mapping.streams.values() for name in chosen(one.columns, names)}
+    needed = {*samples, *mapping.texts(), *(one.time.column for one in mapping.streams.values())}
+    return {*samples, *mapping.numbers()}, {*mapping.numbers()} - needed
+
+
+def _refuse_other_rows(names: Sequence[str], malformed: Mapping[int, Sequence[str]], words: Mapping[int, str]) -> None:
+    """Refuse rows, by their numbers, of names or units.
+
+    These are malformed ones with the name of a column, and others with a word in an unused column of numbers.
+    """
+    for number, cells in malformed.items():
+        if {*cells} & {*names}:
+            raise InvalidData(
+                f'row {number}: the names of the columns come again, {", ".join(cells[:5])}, so another recording may '
+                'begin there; split the file there'
+            )
+    for number, name in words.items():
+        raise InvalidData(
+            f"row {number}, column '{name}': a word in a column of numbers that no key uses: the row may be one of "
+            f"units or means; remove it, or read texts there by rows: {{{name!r}: '*'}}"
+        )
 
 
 def _names(cells: Sequence[str], form: FileFormat) -> list[str]:
     """Return the names of the columns by the first row."""
+    if cells == ['']:
+        raise InvalidData('it is empty, or has comments only; choose files with samples')
     if not cells or '\0' in cells[0]:
         raise InvalidData('it has no columns; give a text file in UTF-8 with a row for each sample')
     if len(cells) > MAX_CHANNELS:

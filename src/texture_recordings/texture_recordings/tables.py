@@ -57,6 +57,7 @@ from texture_recordings.readers import (
 
 PLAUSIBLE_HZ, LIKELY_HZ = (5.0, 200_000.0), (20.0, 20_000.0)
 LONGEST_SLIDE_S = 1800.0
+NAN = 'have NaN samples, and windows with one are unusable'
 SAME_TIME_S = 1e-9
 MAX_NUMBERED = 3  # columns name_1 … name_n beyond this may be samples: the mapping has to tell
 ROWS_A_CODE = 2  # at least, of a column that may name sensors, trials or runs
@@ -80,6 +81,7 @@ class ImportReport:
     files: int = 0
     rows: int = 0
     slides: Counter[str] = field(default_factory=Counter)
+    with_nan: int = 0  # slides: windows with such a sample are unusable
     streams: dict[tuple[str, str], Counter[str]] = field(default_factory=lambda: defaultdict(Counter))
     channels: dict[str, Sequence[str]] = field(default_factory=dict)
     rates_hz: dict[str, float] = field(default_factory=dict)
@@ -108,7 +110,7 @@ class ImportReport:
         """Return the table that a person checks, and below it what was left out and why."""
         units = {'speed': 'm/s', 'force': 'N', 'direction': 'rad'}
         named = [name for name in units if any(key[1] == name for key in self.conditions)]
-        table = [['surface', 'stream', 'slides', 'seconds', 'rate', 'channels', 'lost',
+        table = [['surface', 'stream', 'slides', 'seconds', 'rate', 'channels', 'lost', 'NaN',
                   *(f'{name} ({units[name]})' for name in named)]]  # fmt: skip
         for (surface, stream), counts in sorted(self.streams.items()):
             names, rate_hz = self.channels[stream], self.rates_hz[stream]
@@ -117,11 +119,12 @@ class ImportReport:
             seconds = f'{counts["samples"] / rate_hz:.1f}'
             shown = f'1: {shown}' if shown.isdigit() else shown
             table.append([surface, stream, str(self.slides[surface]), seconds, f'{rate_hz:g} Hz', shown,
-                          str(counts['lost']), *spread])  # fmt: skip
+                          str(counts['lost']), str(counts['NaN']), *spread])  # fmt: skip
         widths = [max(map(len, column)) for column in zip(*table, strict=True)]
         lines = ['  '.join(map(str.ljust, row, widths)).rstrip() for row in table]
         slides = sum(self.slides.values())
-        lines.append(f'{slides} slides over {len(self.slides)} surfaces from {self.files} files of {self.rows} rows')
+        total = f'{slides} slides over {len(self.slides)} surfaces from {self.files} files of {self.rows} rows'
+        lines.append(total + (f'; {self.with_nan} slides {NAN}' if self.with_nan else ''))
         lines.append('left out: nothing' if not self.left_out else 'left out:')
         for reason, count in self.left_out.items():
             lines += [f'  {count} {reason}', *(f'    {example}' for example in self.examples[reason])]
@@ -303,6 +306,7 @@ class FrameSlides:
             lines = np.arange(len(mask)) if frame.lines is None else frame.lines
             frame = replace(
                 frame, lines=lines[mask], junk=None if frame.junk is None else frame.junk[mask],
+                gaps=None if frame.gaps is None else frame.gaps[mask],
                 columns={key: one[mask] if one.shape == mask.shape else one for key, one in frame.columns.items()},
             )  # fmt: skip
         return frame
@@ -387,17 +391,22 @@ class FrameSlides:
         return InvalidData(f"row {self._line(row)}, column '{column}': {reason}")
 
     def _check_malformed(self) -> None:
-        """Count the malformed rows of the streams; InvalidData if they are too many."""
+        """Count malformed rows of streams and cells of conditions; InvalidData if they are too many."""
+        frame, faults = self._frame, list[tuple[str, int, int, Sequence[str]]]()
+        if frame.gaps is not None and frame.gaps.any():
+            count, length = int(frame.gaps.sum()), len(frame.gaps)
+            faults.append(('rows with a condition that is no number', count, length, frame.gap_reasons))
         for length, bad in self._malformed.items():
             count = int(bad.sum())
             first = f'row {self._line(int(bad.argmax()))}, no finite number' if count else 'no row at all'
-            reasons = self._frame.reasons or [first]
+            faults.append(('malformed rows, NaN where they are in a slide', count, length, frame.reasons or [first]))
             self._report.rows += length
-            self._report.leave_out('malformed rows', count, *(f"'{self._place}', {reason}" for reason in reasons))
+        for reason, count, length, places in faults:
+            self._report.leave_out(reason, count, *(f"'{self._place}', {place}" for place in places))
             if not length or count > MAX_LEFT_OUT * length:
                 raise InvalidData(
-                    f'it has {count} malformed rows of {length}, first {reasons[0]}; at most {100 * MAX_LEFT_OUT:g} % '
-                    'are taken; look at the columns and at `format` in the mapping'
+                    f'it has {count} {reason.split(", ")[0]} of {length}, first {places[0]}; at most '
+                    f'{100 * MAX_LEFT_OUT:g} % are taken; look at the columns and at `format` in the mapping'
                 )
 
     # ---- slides
@@ -549,6 +558,7 @@ class FrameSlides:
             )
         streams = {one.name: self._samples(one, surface, self._frame_rows(rows), begin_s, end_s)
                    for one in self._streams}  # fmt: skip
+        self._report.with_nan += any(np.isnan(signal.samples).any() for signal, _ in streams.values())
         known: dict[str, Any] = {}
         for name, column in CONDITION_COLUMNS.items():
             mean = self._condition(name, rows)
@@ -599,6 +609,7 @@ class FrameSlides:
                 self._report.streams[surface, stream.name][reason] += stream.per_row * left
             else:
                 self._report.leave_out(f"{reason} of '{stream.name}'", left, f"'{self._place}'")
+        self._report.streams[surface, stream.name]['NaN'] += int(np.isnan(samples[rows]).any(axis=1).sum())
         # Successive columns that are consecutive samples of one channel.
         count = stream.per_row
         flat = samples[rows].reshape(len(rows), -1, count).transpose(0, 2, 1).reshape(len(rows) * count, -1)

@@ -12,6 +12,7 @@ from pathlib import Path
 from texture_benchmarks.catalogue import BENCHMARKS, run_benchmark
 from texture_benchmarks.study import BenchmarkOptions
 from texture_core.cli import add_seed, task
+from texture_evaluation.charts import REDUCED
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -38,5 +39,7 @@ def run(options: argparse.Namespace) -> int:
         result, path = run_benchmark(options.name, benchmark_options)
     what = (BENCHMARKS[options.name].__doc__ or '').splitlines()[0]
     took = f'{options.name}, {time.monotonic() - began_s:.0f} s: {what}'
+    if options.quick:
+        print(REDUCED)
     print('\n  '.join([took, result.data, *map(str, (path, *result.charts))]), flush=True)
     return 0

@@ -23,7 +23,7 @@ from texture_bringup.launcher import (
     given_arguments,
     read,
 )
-from texture_core.cli import Command, add_namespace, add_parameters, add_seed, parameters_from
+from texture_core.cli import Command, add_namespace, add_parameters, add_seed, parameters_from, task
 
 # Each command imports what it starts when it runs: a launcher is a child of many programs, and is up sooner without.
 # ruff: noqa: PLC0415
@@ -75,8 +75,10 @@ def refuse_wrong(nodes: Sequence[NodeDescription], given: set[str]) -> None:
             wanted.append((module, load, *values))
     if wanted:
         with ProcessPoolExecutor(1, get_context('fork')) as pool:
-            for one in wanted:
-                pool.submit(_look_at, *one).result()
+            checks = [pool.submit(_look_at, *one) for one in wanted]
+            with task('check the files that the launch names'):  # behind the fork, which copies no thread
+                for check in checks:
+                    check.result()
 
 
 def _say(line: str) -> None:

@@ -10,7 +10,7 @@ from contextlib import nullcontext
 from importlib.metadata import version
 from itertools import takewhile
 
-from texture_core.cli import Command, add_dask, add_seed, add_slides, core_count, task
+from texture_core.cli import Command, add_dask, add_seed, add_slides, core_count
 from texture_core.config import refuse_inputs, shipped, write_json
 from texture_core.errors import InvalidParameter
 from texture_estimation.model import both_files, load_model
@@ -86,10 +86,7 @@ def _cross_validate(options: argparse.Namespace) -> int:
         cut_slide(dataset[0], recipe.feature_set)
     with dask_backend(options.dask) if options.dask else nullcontext():
         jobs = None if options.dask else options.jobs
-        results = []
-        for recipe in recipes:
-            with task(f"cross-validate '{recipe.name}'"):
-                results.append(cross_validate(recipe, dataset, split.splitter, jobs, groups=split.groups))
+        results = [cross_validate(recipe, dataset, split.splitter, jobs, groups=split.groups) for recipe in recipes]
     for line in (line for result in results for line in table(result, split.name)):
         print(line)
     compared = [compare(results[0], other) for other in results[1:]]

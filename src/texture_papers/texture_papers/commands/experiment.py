@@ -8,6 +8,7 @@ import argparse
 from pathlib import Path
 
 from texture_core.cli import add_seed, core_count
+from texture_evaluation.charts import REDUCED
 from texture_papers.catalogue import EXPERIMENTS, run_experiment
 from texture_papers.protocol import Experiment
 
@@ -32,7 +33,7 @@ def run(options: argparse.Namespace) -> int:
     experiment = Experiment(options.out, options.seed, options.quick, options.tune, options.jobs)
     result, path = run_experiment(options.name, experiment, options.seeds)
     if options.quick:
-        print('REDUCED: fewer slides, not comparable with a published figure')
+        print(REDUCED)
     print(f'{result.name}: {result.measured}')
     print(f'data: {result.data}; split: {result.split}')
     for line in result.lines():
