@@ -98,6 +98,14 @@ def test_a_second_set_up_does_nothing_and_another_python_makes_the_environment_a
     assert made == [(3, 12), (3, 13)]
 
 
+def test_a_long_step_gives_signs_of_life(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(workspace, 'SIGN_S', 0.1)
+    workspace.run(sys.executable, '-c', 'import time; time.sleep(0.5)')
+    assert 'set-up: still at work after 0 min' in capfd.readouterr().out
+    with pytest.raises(workspace.SetupError, match='this command failed'):
+        workspace.run(sys.executable, '-c', 'raise SystemExit(3)')
+
+
 def test_each_file_of_the_lock_has_its_hash() -> None:
     text = workspace.LOCK.read_text()
     names = re.findall(r'^\w[^ \n]*==.*$', text, re.MULTILINE)

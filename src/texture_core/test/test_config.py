@@ -7,6 +7,7 @@ import os
 import re
 import socket
 import sys
+import tracemalloc
 import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -152,6 +153,8 @@ BAD = {
     'two documents': b'a: 1\n---\nb: 2',
     'a list as a key': b'? [1]\n: 2',
     'no text': b'\xff\xd8\xff',
+    'an alias': b'a: &a [1]\nb: *a',
+    'itself': b'&a [*a]',
 }
 
 
@@ -234,3 +237,27 @@ def test_an_archive_that_unpacks_to_more_than_a_gigabyte_is_refused() -> None:
     assert Archive(file).read('a') == b'some'
     with pytest.raises(FileRefused, match='unpacks to more than 1000 MB'):
         Archive(io.BytesIO(lying))
+
+
+def test_no_more_of_a_member_is_unpacked_than_the_directory_states() -> None:
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, 'w', zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr('a', bytes(50_000_000))
+    content, directory = file.getvalue(), file.getvalue().index(b'PK\x01\x02') + 24
+    lying = Archive(io.BytesIO(content[:directory] + (1000).to_bytes(4, 'little') + content[directory + 4 :]))
+    tracemalloc.start()
+    try:
+        with pytest.raises(FileRefused, match="'a' is damaged: Bad CRC-32"):
+            lying.read('a')
+        assert tracemalloc.get_traced_memory()[1] < 1_000_000
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize('method', [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_a_method_that_zipfile_unpacks_without_a_limit_is_refused(method: int) -> None:
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, 'w', method) as archive:
+        archive.writestr('a', b'some')
+    with pytest.raises(FileRefused, match='another method than deflate; save it by'):
+        Archive(file)

@@ -264,7 +264,7 @@ def read_array(file: IO[bytes]) -> AnyArray:
 class Archive:
     """The members of a zip file, such as .npz or .skops, which unpack to 1 GB at most.
 
-    zipfile gives no more of a member than its directory states, so the stated sizes are what counts.
+    No more of a member is unpacked than the directory states, so the stated sizes are what counts.
     """
 
     def __init__(self, file: IO[bytes], most_bytes: int = MAX_FILE_BYTES) -> None:
@@ -275,6 +275,11 @@ class Archive:
         self.names = tuple(dict.fromkeys(self._zip.namelist()))
         if sum(member.file_size for member in self._zip.infolist()) > most_bytes:
             raise FileRefused(f'it unpacks to more than {most_bytes // MB} MB, which is the limit for such a file')
+        # zipfile unpacks other methods without a limit.
+        if any(
+            member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) for member in self._zip.infolist()
+        ):
+            raise FileRefused('it is compressed by another method than deflate; save it by numpy.savez_compressed')
 
     def __enter__(self) -> Archive:
         return self
@@ -288,7 +293,8 @@ class Archive:
         if info.file_size > most_bytes:
             raise FileRefused(f"its member '{name}' has more than {most_bytes / MB:.3g} MB")
         try:
-            return self._zip.read(info)
+            with self._zip.open(info) as member:
+                return member.read(info.file_size + 1)  # without a size, zipfile unpacks all that there is
         except BROKEN_CONTENT as error:
             raise FileRefused(f"its member '{name}' is damaged: {error}") from error
 
@@ -331,7 +337,7 @@ def _real(path: str | Path) -> Path:
 # --------------------
 # Read YAML and JSON of any origin as plain values: nothing is run. Figures are also written as JSON here.
 
-MAX_CHARACTERS = 100_000  # of YAML, which take 3 s at worst; the longest settings in use have a tenth
+MAX_CHARACTERS = 100_000  # of YAML, which take 3 s at worst without aliases; the longest settings in use have a tenth
 MAX_CARD_BYTES = 5 * MB
 # What the parsers raise, depending on what is wrong; a value such as 2024-99-99 or !!bool x is no YAMLError.
 PARSE_ERRORS = (
@@ -383,11 +389,23 @@ def load_card(path: Path) -> Any:
         raise InvalidParameter(f"model card '{path}' cannot be read: {error}") from error
 
 
+class _PlainLoader(yaml.SafeLoader):
+    """Reads no aliases, with which 400 bytes may stand for a billion values."""
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        if self.check_event(yaml.AliasEvent):
+            event = self.get_event()  # type: ignore[no-untyped-call]
+            raise ValueError(
+                f"line {event.start_mark.line + 1} has the alias '*{event.anchor}'; write there what it stands for"
+            )
+        return super().compose_node(parent, index)
+
+
 def parse_yaml(text: str) -> Any:
     """Return the plain values in a text; one of `PARSE_ERRORS` is raised if it is no YAML, or too much of it."""
     if len(text) > MAX_CHARACTERS:
         raise ValueError(f'it has {len(text)} characters; {MAX_CHARACTERS} are allowed')
-    return yaml.safe_load(text)
+    return yaml.load(text, _PlainLoader)
 
 
 def load_json(path: Path, most_bytes: int) -> Any:

@@ -8,7 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StoragePlugin, Writer
+import yaml
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from rosbags.rosbag2.metadata import parse_qos
 
 from texture_core.config import MB
 from texture_core.errors import InvalidData
@@ -91,8 +93,9 @@ def test_a_bag_played_by_ros_offers_every_topic_as_the_nodes_do(tmp_path: Path) 
     with BagWriter(tmp_path / 'bag') as bag:
         for topic, value in (*VALUES, ('signal_baseline', baseline)):
             bag.write(f'left/{topic}', value, 1)
-    with Reader(tmp_path / 'bag') as reader:
-        offered = {c.topic.rpartition('/')[2]: c.ext.offered_qos_profiles[0] for c in reader.connections}
+    facts = yaml.safe_load((tmp_path / 'bag' / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
+    topics = [topic['topic_metadata'] for topic in facts['topics_with_message_count']]
+    offered = {one['name'].rpartition('/')[2]: parse_qos(one['offered_qos_profiles'])[0] for one in topics}
     latched = {'texture', 'roughness', 'exploration', 'model_info', 'signal_baseline'}
     assert {name for name, qos in offered.items() if qos.durability.name == 'TRANSIENT_LOCAL'} == latched
     assert {name for name, qos in offered.items() if qos.reliability.name == 'BEST_EFFORT'} == {'signal'}

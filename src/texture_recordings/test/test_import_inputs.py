@@ -3,8 +3,10 @@
 """Inputs that somebody could have, one table for each kind: the true samples, or a refusal that says what is wrong."""
 
 import io
+import sqlite3
 import struct
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -429,9 +431,9 @@ def h5(rows: int = N, chunks: int = 100, **attributes: float) -> Write:
     return write
 
 
-def wav(declared: int, sounds: int = 1) -> Write:
+def wav(declared: int, sounds: int = 1, channels: int = 1) -> Write:
     samples = (X * 2**14).astype('<i2').tobytes()
-    head = b'WAVEfmt ' + struct.pack('<IHHIIHH', 16, 1, 1, 1000, 2000, 2, 16)
+    head = b'WAVEfmt ' + struct.pack('<IHHIIHH', 16, 1, channels, 1000, 2000, 2, 16)
     body = head + (b'data' + struct.pack('<I', declared) + samples) * sounds
     return lambda folder: (folder / 'cork_1.wav').write_bytes(b'RIFF' + struct.pack('<I', len(body)) + body)
 
@@ -463,6 +465,8 @@ CONTAINERS: dict[str, tuple[Write, dict, Truth]] = {
     'a WAV file that was cut': (wav(2 * N + 2000), SOUND, 'was cut off, .* declares 3200 bytes of sound and has 1200'),
     'a WAV file of a pipe': (wav(2**32 - 1), SOUND, 'or written to a pipe: it declares 4294967295 bytes'),
     'two sounds': (wav(2 * N, 2), SOUND, 'has 2 chunks of sound'),
+    'a WAV file of many channels': (wav(2 * N, channels=65535), SOUND, 'declares 65535 channels .* from 1 to 10000'),
+    'a WAV file of no channels': (wav(2 * N, channels=0), SOUND, 'declares 0 channels'),
     'trials as one slide': (
         npz(X=np.ones((20, 100, 3))), {**ANY, 'streams': {'signal': {'columns': ['X.*'], 'rate_hz': 100.0}}},
         r'slides: \{by: column, column: trial\}',
@@ -558,7 +562,47 @@ def table(folder: Path) -> None:
         writer.write(connection, START_NS, STORE.serialize_cdr(value, kind))
 
 
+def foreign(definition: str, content: bytes = bytes(64)) -> Write:
+    """Write a bag with one message of a type of others."""
+
+    def write(folder: Path) -> None:
+        with Writer(folder / 'a_1', version=8, storage_plugin=StoragePlugin.MCAP) as writer:
+            connection = writer.add_connection('/p', 'my_msgs/msg/A', msgdef=definition, rihs01='RIHS01_0')
+            writer.write(connection, START_NS, b'\x00\x01\x00\x00' + content)
+
+    return write
+
+
+def database(sql: str) -> Write:
+    def write(folder: Path) -> None:
+        with closing(sqlite3.connect(folder / 'a_1' / 'a_1.db3')) as opened:
+            opened.executescript(sql)
+
+    return both(bag(plugin=StoragePlugin.SQLITE3), write)
+
+
+B = '=' * 80 + '\nMSG: my_msgs/B\n'
+COUNT = 'WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM c) SELECT x FROM c'
 BAGS: dict[str, tuple[Write, Truth]] = {
+    'SQLite': (bag(plugin=StoragePlugin.SQLITE3), HALVES),
+    'SQLite with a view that never ends': (database(f'CREATE VIEW v AS {COUNT}'), "'v' in it is none of the plain"),
+    'SQLite with a computed column': (
+        database('CREATE TABLE v (y, x BLOB AS (zeroblob(1000000000)))'), "'v' in it is none of the plain tables",
+    ),
+    'SQLite with a large message': (
+        database('UPDATE messages SET data = zeroblob(5000000) WHERE id = 9'), 'a message of 5 MB; at most 4 MB',
+    ),
+    'an array of many messages': (
+        foreign(f'my_msgs/B[100000] e\n{B}'), 'A has 100001 values by the lengths of its arrays; at most 2000',
+    ),
+    'arrays in arrays': (foreign(f'my_msgs/B[1000] e\n{B}string[1000] e'), 'has 1001001 values'),
+    'an array without elements': (foreign(f'my_msgs/B[] e\n{B}uint8[0] e'), 'an array of 0 elements'),
+    'a type in itself': (foreign('my_msgs/A[] e'), 'my_msgs/msg/A contains itself'),
+    'a long definition': (foreign('float64 e\n' + '#\n' * 50_000), 'has 100010 characters; at most 100000'),
+    'a large message': (foreign('uint8[] e', bytes(5_000_000)), "a message of 5 MB on '/p'; at most 4 MB"),
+    'a stamp that is a number': (
+        foreign(f'my_msgs/B header\nfloat64 x\n{B}float64 stamp', bytes(16)), "'/p': header.stamp is 0.0; a built",
+    ),
     'a bag of ROS 1': (text('#ROSBAG V2.0', 'a_1.bag'), 'is a bag of ROS 1; convert it: rosbags-convert'),
     'a clock one hour ahead': (bag(3600.0), HALVES),
     'a clock that began at the start': (bag(-1.7e9 + 100.0), HALVES),

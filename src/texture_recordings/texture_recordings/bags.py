@@ -9,14 +9,15 @@ import logging
 import os
 import re
 import shutil
+import sqlite3
 import struct
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import replace
 from functools import cache, partial
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from pathlib import Path
 from typing import IO, Any, BinaryIO, NamedTuple, cast
 from zlib import crc32
@@ -45,6 +46,7 @@ try:
     from rosbags.interfaces import (
         Connection,
         MessageDefinitionFormat,
+        Nodetype,
         Qos,
         QosDurability,
         QosHistory,
@@ -59,7 +61,9 @@ try:
         ReaderError,
         StoragePlugin,
         Writer,
+        reader,
         storage_mcap,
+        storage_sqlite3,
     )
     from rosbags.serde import SerdeError
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -77,7 +81,11 @@ except ModuleNotFoundError as error:  # rosbags brings the others
 # it ended behind its last whole chunk.
 
 MAX_METADATA_BYTES = 100_000  # of metadata.yaml: a file of 600 parts
-MAX_UNPACKED_BYTES, MAX_RATIO = 200 * MB, 100  # largest unpacked size of a bag, and its ratio to the packed size
+MAX_UNPACKED_BYTES, MAX_RATIO = 200 * MB, 100  # of a bag or what is held at once; ratio of unpacked to packed size
+MAX_MESSAGE_BYTES = 4 * MB  # whose elements of a byte take 150 each as objects
+SQLITE = b'SQLite format 3\0'
+# The tables and indices of a bag by SQLite: no views, no computed columns.
+PLAIN_SQL = re.compile(r'CREATE (TABLE|INDEX) \w+\s*(ON \w+\s*)?\([^()]*\)')
 CHUNK = 0x06
 CHUNK_CHECKSUM_AT = 33  # from the beginning of the record of a chunk
 CHUNK_HEAD = struct.Struct('<QQQI')  # start and end time, size of what it unpacks to, checksum
@@ -96,19 +104,35 @@ def _check_unpacked(unpacked: int, size: int) -> None:
         )
 
 
-# rosbags unpacks whatever comes; here it stops at what a chunk declares.
-storage_mcap.DECOMPRESSORS['zstd'] = lambda data, size: zstd.ZstdDecompressor().decompress(data, size + 1)
-storage_mcap.DECOMPRESSORS['lz4'] = lambda data, size: lz4.frame.LZ4FrameDecompressor().decompress(data, size + 1)
+def _check_held(size: int, what: str) -> int:
+    if size > MAX_UNPACKED_BYTES:
+        raise FileRefused(
+            f'it has {what} of {size / MB:.0f} MB; at most {MAX_UNPACKED_BYTES // MB} MB are read at once'
+        )
+    return size
+
+
+def _unpack_zstd(data: bytes, size: int) -> bytes:
+    return zstd.ZstdDecompressor().decompress(data, _check_held(size, 'a chunk') + 1)
+
+
+def _unpack_lz4(data: bytes, size: int) -> bytes:
+    return bytes(lz4.frame.LZ4FrameDecompressor().decompress(data, _check_held(size, 'a chunk') + 1))
+
+
+# rosbags unpacks whatever comes; here it stops at what a chunk declares. Nor does it parse, channel by channel, which
+# quality of service was offered: to read needs none.
+storage_mcap.DECOMPRESSORS |= {'zstd': _unpack_zstd, 'lz4': _unpack_lz4}
+for module in (reader, storage_mcap, storage_sqlite3):
+    vars(module)['parse_qos'] = lambda _offered: []
 
 
 class CheckedPath(type(Path())):  # type: ignore[misc]
     """A path from which only regular files are read; files of text are short."""
 
     def open(self, *_args: Any, **_options: Any) -> IO[Any]:
-        """Open the file for reading bytes, an MCAP file without its end up to its last whole chunk."""
-        file = open_regular(self, None)
-        if self.suffix != '.mcap':
-            return file
+        """Open an MCAP file for reading bytes, one without its end up to its last whole chunk."""
+        file = _Records(cast('io.BufferedReader', open_regular(self, None)).detach())
         small = file.seek(0, io.SEEK_END) < 50 * MB  # a larger one takes as much memory anyway
         whole = _has_end(file)
         if whole and not small:
@@ -122,6 +146,17 @@ class CheckedPath(type(Path())):  # type: ignore[misc]
     def read_text(self, encoding: str | None = None, errors: str | None = None) -> str:
         """Return the text of a short file."""
         return read_text(self, MAX_METADATA_BYTES, encoding or 'utf-8')
+
+
+class _Records(io.BufferedReader):
+    """A file of records: a hole in it takes no space on the disk, and may be declared as a record, or as many."""
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        """Return the next bytes."""
+        content = super().read(_check_held(size or 0, 'a record') if size is not None else size)
+        if size == 1 and content == b'\0':
+            raise FileRefused('it has a record of kind 0, which there is not in MCAP')
+        return content
 
 
 class _Ended:
@@ -153,7 +188,7 @@ def _has_end(file: BinaryIO) -> bool:
     summary, checksum = int.from_bytes(end[9:17], 'little'), int.from_bytes(end[-12:-8], 'little')
     if summary and checksum:
         file.seek(min(summary, size))
-        if crc32(file.read()[:-CHECKSUM_FROM_END]) != checksum:
+        if crc32(file.read(max(0, size - summary))[:-CHECKSUM_FROM_END]) != checksum:
             raise FileRefused('its index was altered: the checksum differs')
     file.seek(0)
     return True
@@ -218,16 +253,56 @@ def typestore() -> Typestore:
     return store
 
 
+# Of a message of others; rosbags makes code for each element of an array of fixed length.
+MAX_DEFINITION_CHARACTERS, MAX_FIELDS, MAX_DEPTH = 100_000, 2000, 20
+
+
 def message_types(connection: Connection | None = None) -> Typestore:
     """Return message types by the definition that a bag stores for a connection, else those of ROS 2."""
     definition = connection.msgdef if connection else None
     if connection and definition and definition.format is MessageDefinitionFormat.MSG:
         typestore = get_typestore(Stores.EMPTY)
+        if len(definition.data) > MAX_DEFINITION_CHARACTERS:
+            raise InvalidData(
+                f'the definition of {connection.msgtype} has {len(definition.data)} characters; at most '
+                f'{MAX_DEFINITION_CHARACTERS} are read, republish it as a standard message'
+            )
         parsed = get_types_from_msg(definition.data, connection.msgtype)
         # Constants and defaults are left out: of a file nothing but names, as the grammar allows them, becomes code.
-        typestore.register({name: ([], fields) for name, (_, fields, *_) in parsed.items()})
+        types = {name: fields for name, (_, fields, *_) in parsed.items()}
+        _check_size(types, connection.msgtype)
+        typestore.register({name: ([], fields) for name, fields in types.items()})
         return typestore
     return get_typestore(Stores.ROS2_JAZZY)
+
+
+def _check_size(types: Mapping[str, Sequence[Any]], msgtype: str) -> None:
+    """Refuse types that contain themselves, or more values than are read by the fixed lengths of their arrays."""
+
+    def count(kind: Nodetype, part: Any) -> int:
+        if kind is Nodetype.BASE:
+            return 1
+        if kind is Nodetype.NAME:
+            return values.get(part, 1)
+        inner, length = part
+        if kind is Nodetype.ARRAY and not length:
+            raise InvalidData(f'{msgtype} has an array of 0 elements, which take no bytes; republish it without')
+        return count(*inner) * (length if kind is Nodetype.ARRAY else 1)
+
+    # A message is one value and those of its fields; it has settled after as many rounds as messages are nested.
+    values = dict.fromkeys(types, 1)
+    for _ in range(MAX_DEPTH):
+        found = {name: 1 + sum(count(*field) for _, field in fields) for name, fields in types.items()}
+        if found == values:
+            break
+        values = found
+    else:
+        raise InvalidData(f'{msgtype} contains itself, or messages nested deeper than {MAX_DEPTH}; republish it flat')
+    if max(values.values()) > MAX_FIELDS:
+        raise InvalidData(
+            f'{msgtype} has {max(values.values())} values by the lengths of its arrays; at most {MAX_FIELDS} are read, '
+            'republish those that are needed'
+        )
 
 
 CODEC = MessageCodec(
@@ -446,26 +521,62 @@ def _read(
         if foreign and path.is_dir() and more:
             raise FileRefused(f'{", ".join(sorted(more)[:3])} is not listed in its metadata.yaml; ros2 bag reindex')
         for file in files:
-            open_regular(file, None).close()
-        with Reader(checked) as reader:
-            candidates = reader.connections if foreign else connections_below(path, reader.connections, namespace)
-            names = topic_names(c.topic for c in reader.connections if c.msgtype in MESSAGES)
+            with open_regular(file, None) as opened:
+                if opened.read(len(SQLITE)) == SQLITE:
+                    _check_database(file)
+        with Reader(checked) as bag:
+            _check_chunks(bag)
+            candidates = bag.connections if foreign else connections_below(path, bag.connections, namespace)
+            names = topic_names(c.topic for c in bag.connections if c.msgtype in MESSAGES)
             connections = [c for c in candidates if chosen(c, names.get(c.topic, c.topic))]
-            if not connections or not reader.message_count:
+            if not connections or not bag.message_count:
                 return
             missing = sum(connection.msgcount for connection in connections)
-            for connection, log_ns, data in reader.messages(connections, start_ns, stop_ns):
+            for connection, log_ns, data in bag.messages(connections, start_ns, stop_ns):
                 missing -= 1
+                if len(data) > MAX_MESSAGE_BYTES:
+                    raise InvalidData(
+                        f"the bag '{path}' has a message of {len(data) / MB:.3g} MB on '{connection.topic}'; at most "
+                        f'{MAX_MESSAGE_BYTES // MB} MB are read'
+                    )
                 name = names.get(connection.topic, connection.topic)
                 yield name, RawMessage(connection.topic, connection.msgtype, log_ns, data)
             if missing and start_ns is None and stop_ns is None:
                 raise ReaderError(f'{missing} of its messages are missing')
     except TextureError:
         raise
+    except FileRefused as error:
+        raise InvalidData(f"the bag '{path}' cannot be read: {error}") from error
     except Exception as error:  # whatever the reader raises, which depends on the byte that is wrong
         raise InvalidData(
             f"the bag '{path}' cannot be read, it is damaged or cut off: {error}; record it again"
         ) from error
+
+
+def _check_chunks(bag: Reader) -> None:
+    """Refuse a bag whose chunks unpack to too much, in all or at one time: those that overlap are held together."""
+    for storage in getattr(bag.storage, 'storages', [bag.storage]):
+        chunks = [
+            (c.message_start_time, c.message_end_time, c.uncompressed_size) for c in getattr(storage, 'chunks', ())
+        ]
+        _check_unpacked(sum(size for _, _, size in chunks), storage.path.stat().st_size)
+        changes = [(begin, size) for begin, _, size in chunks]
+        changes += [(max(begin, end) + 1, -size) for begin, end, size in chunks]
+        for held in accumulate(size for _, size in sorted(changes)):
+            _check_held(held, 'chunks of one time')
+
+
+def _check_database(path: Path) -> None:
+    """Refuse a bag by SQLite that computes what is read from it, or has a message that is too large."""
+    if {*'?#%'} & {*str(path)}:
+        raise FileRefused(f"its path '{path}' has one of ?, # and %, by which SQLite finds another file; rename it")
+    with closing(sqlite3.connect(f'file:{path}?immutable=1', uri=True)) as database:
+        for name, sql in database.execute('SELECT name, sql FROM sqlite_master'):
+            if sql and not PLAIN_SQL.fullmatch(sql):
+                raise FileRefused(f"'{name}' in it is none of the plain tables of a bag, and may compute without end")
+        largest = database.execute('SELECT max(length(data)) FROM messages').fetchone()[0] or 0
+    if largest > MAX_MESSAGE_BYTES:
+        raise FileRefused(f'it has a message of {largest / MB:.3g} MB; at most {MAX_MESSAGE_BYTES // MB} MB are read')
 
 
 def _files(path: Path) -> list[Path]:

@@ -24,7 +24,7 @@ import numpy as np
 from texture_core.config import MB, Arrays, library, open_regular, read_array, unknown_name
 from texture_core.errors import InvalidData, TextureError, UnknownName
 from texture_core.types import MAX_HZ, NANOSECONDS, AnyArray, Array
-from texture_recordings.bags import is_bag, message_types, read_foreign
+from texture_recordings.bags import MAX_FIELDS, is_bag, message_types, read_foreign
 from texture_recordings.mapping import FileFormat, TableMapping, template_fields
 
 MAX_FILE_BYTES = 1000 * MB
@@ -478,13 +478,21 @@ def _check_wav(file: Any) -> None:
     order = '>' if file.read(12)[:4] == b'RIFX' else '<'
     while len(head := file.read(8)) == 8:
         name, length = struct.unpack(f'{order}4sI', head)
+        begin = file.tell()
         sounds += name == b'data'
+        if name == b'fmt ':
+            channels, frame_bytes = struct.unpack(f'{order}2xH8xH', file.read(14))
+            if not 0 < channels <= MAX_CHANNELS or not frame_bytes or frame_bytes % channels:
+                raise InvalidData(
+                    f'it declares {channels} channels and {frame_bytes} bytes for a sample of all; from 1 to '
+                    f'{MAX_CHANNELS} channels are read, each of as many bytes; save it again as a plain WAV file'
+                )
         if name == b'data' and length > size - file.tell():
             raise InvalidData(
                 f'it was cut off, or written to a pipe: it declares {length} bytes of sound and has '
                 f'{size - file.tell()}; copy or save it again'
             )
-        file.seek(length + length % 2, io.SEEK_CUR)
+        file.seek(begin + length + length % 2)
     if sounds != 1:
         raise InvalidData(f'it has {sounds} chunks of sound, one is needed; save it again as a plain WAV file')
     file.seek(0)
@@ -596,7 +604,6 @@ def _joined(name: str, part: str) -> str:
 
 # ---- bags of messages: each number of a message is a column, such as '/wrench/wrench.force.x'
 
-MAX_FIELDS = 2000  # of one message
 OTHER_CLOCK_NS = NANOSECONDS  # stamps that differ more from the time of logging are of another clock
 
 
@@ -627,6 +634,17 @@ def _fields_of(value: Any, msgtype: str) -> dict[str, Any]:
             raise InvalidData('its array has several dimensions; republish it flat, or use `SlideDataset.from_arrays`')
         _values(value, '', found)
     return found
+
+
+def _stamp_ns(stamp: Any, topic: str) -> int:
+    """Return the time in a header, ns; 0 if there is none."""
+    if stamp is None:
+        return 0
+    if not all(isinstance(getattr(stamp, part, None), int) for part in ('sec', 'nanosec')):
+        raise InvalidData(
+            f"'{topic}': header.stamp is {stamp!r:.80}; a builtin_interfaces/msg/Time of whole numbers is needed"
+        )
+    return int(stamp.sec * NANOSECONDS + stamp.nanosec)
 
 
 def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:
@@ -673,8 +691,7 @@ def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
         found = {part: one for part, one in found.items() if part in kept[name]}
         take(2 * len(found))  # they take more than their values
         before.append(found)
-        stamp = getattr(getattr(value, 'header', None), 'stamp', None)
-        stamp_ns = stamp.sec * NANOSECONDS + stamp.nanosec if stamp else 0
+        stamp_ns = _stamp_ns(getattr(getattr(value, 'header', None), 'stamp', None), name)
         stamps.setdefault(name, []).append((stamp_ns or message.log_ns, message.log_ns))
     if not rows:
         raise InvalidData(
