@@ -88,7 +88,8 @@ def test_an_unknown_path_is_not_found(path) -> None:
 def test_a_command_is_passed_on_and_a_refusal_is_reported() -> None:
     async def story(client, nodes):
         assert (await post(client, body='{"on": true}'))[0] == 200
-        assert nodes.asked == [{'on': True}]
+        assert (await post(client, body='{}', **{'Content-Type': 'application/json; charset=none'}))[0] == 200
+        assert nodes.asked == [{'on': True}, {}]
         status, text = await post(client, 'explore')
         assert (status, json.loads(text)['success']) == (409, False)
         assert 'allowed is 0.002' in text
@@ -103,9 +104,11 @@ def test_a_command_is_passed_on_and_a_refusal_is_reported() -> None:
         ('x' * (MAX_BODY_BYTES + 1), {}, 413),
         ('{', {}, 400),
         ('[]', {}, 400),
+        (r'{"label": "\ud800"}', {}, 400),
         ('{}', {'Content-Type': 'text/plain'}, 415),
         ('{}', {'Origin': 'http://evil.example'}, 403),
         ('{}', {'Origin': 'null'}, 403),
+        ('{}', {'Origin': 'http://['}, 403),
         ('{}', {'Host': 'evil.example'}, 403),
         ('{}', {'Host': '192.0.2.1:8085'}, 403),
         ('{}', {'Host': '['}, 403),
@@ -231,6 +234,19 @@ def test_a_connection_whose_request_does_not_come_to_its_end_is_closed(sent, ans
     finally:
         serving.close()
     assert received.partition(b'\r\n')[0] == answer
+
+
+def test_a_token_that_is_no_text_is_a_wrong_one_and_is_counted() -> None:
+    serving = Serving(make_app(Nodes(), Access('0.0.0.0', TOKEN, ('robot',)), PAGE), '127.0.0.1', 0)
+    asked = b''.join(b'GET / HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer \xff%d\r\n' % i for i in range(7))
+    asked = asked.replace(b'GET', b'\r\nGET').removeprefix(b'\r\n') + b'Connection: close\r\n\r\n'
+    try:
+        with socket.create_connection(('127.0.0.1', serving.port), timeout=DEADLINE_S) as line:
+            line.sendall(asked)
+            answers = b''.join(iter(lambda: line.recv(4096), b''))
+    finally:
+        serving.close()
+    assert re.findall(rb'HTTP/1.1 (\d+)', answers) == [b'401'] * 6 + [b'429']
 
 
 def test_a_port_in_use_is_reported_and_nothing_is_left_running() -> None:

@@ -8,6 +8,7 @@ import os
 import re
 import signal
 import socket
+import urllib.error
 import urllib.request
 from concurrent.futures import ThreadPoolExecutor
 from fnmatch import fnmatch
@@ -143,7 +144,11 @@ class Wire:
         request = urllib.request.Request(
             f'{self._address}api/{name}', json.dumps(body).encode(), {'Content-Type': 'application/json'}
         )
-        with urllib.request.urlopen(request, timeout=DEADLINE_S) as answer:
+        try:
+            answer = urllib.request.urlopen(request, timeout=DEADLINE_S)
+        except urllib.error.HTTPError as refused:
+            answer = refused
+        with answer:
             return json.load(answer)['message']
 
     def until(self, condition):
@@ -176,6 +181,10 @@ def test_an_operator_explores_sees_the_estimate_tares_and_stops_the_next_explora
         page.until(lambda frame: frame['state']['phase'] == 'slide')
         assert 'lifted' in page.post('stop', {})
         assert 'stopped on request' in aborted.result(DEADLINE_S)
+        # Before the explorer has the request.
+        stopped = pool.submit(page.post, 'explore', LONG)
+        page.until(lambda _frame: 'what this page requested is cancelled' in page.post('stop', {}))
+        assert re.search('stopped|cancelled', stopped.result(DEADLINE_S))
     page.until(lambda frame: frame['past'][0]['phase'] == 'aborted')
 
 

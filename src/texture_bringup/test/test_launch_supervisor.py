@@ -144,17 +144,24 @@ def test_a_node_that_dies_is_named_with_its_code_and_the_others_go_on(launch) ->
 @pytest.mark.parametrize(
     ('script', 'attributes', 'expected', 'cause'),
     [
-        ('exit 3', 'on_exit="shutdown"', (1, 1), 'died with exit code 3: why'),
-        ('kill -9 $$', 'on_exit="shutdown"', (1, 1), 'was killed by SIGKILL: why'),
-        ('exit 3', 'respawn="true" respawn_max_retries="2"', (1, 3), 'died with exit code 3: why'),
-        ('exit 2', 'respawn="true"', (2, 1), 'died with exit code 2: why'),  # was started wrongly
+        ('echo "[ERROR] why"; exit 3', 'on_exit="shutdown"', (1, 1), 'died with exit code 3: [ERROR] why'),
+        # The last line of a node that works says nothing of its end.
+        ('echo "[INFO] why"; kill -9 $$', 'on_exit="shutdown"', (1, 1), 'was killed by SIGKILL'),
+        (
+            'echo KeyError: why; exit 3',
+            'respawn="true" respawn_max_retries="2"',
+            (1, 3),
+            'died with exit code 3: KeyError: why',
+        ),
+        # It was started wrongly.
+        ('echo texture: why; exit 2', 'respawn="true"', (2, 1), 'died with exit code 2: texture: why'),
     ],
 )
 def test_the_death_of_a_needed_node_stops_the_others_and_is_named_last(
     launch, script, attributes, expected, cause
 ) -> None:
-    launched = launch({'good': GOOD, 'bad': f'echo why; {script}'}, bad=attributes)
-    assert (launched.end(), launched.lines.count('[bad] why')) == expected
+    launched = launch({'good': GOOD, 'bad': script}, bad=attributes)
+    assert (launched.end(), sum('[bad] ' in line and 'why' in line for line in launched.lines)) == expected
     assert '[launch] bad is required by the other nodes, which are stopped now' in launched.lines
     assert launched.lines[-1] == f'[launch] the launch ended because bad {cause}'
 

@@ -11,10 +11,11 @@ from rclpy.action import ActionServer, CancelResponse
 from rclpy.context import Context
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
+from std_srvs.srv import Trigger
 from texture_msgs import action
 
 from texture_bringup import operator as operators
-from texture_core.errors import LaunchFailed, MotionAborted
+from texture_core.errors import LaunchFailed, MotionAborted, MotionRefused
 from texture_core.ros_testing import LocalGraph
 from texture_core.types import ExplorationRequest
 
@@ -40,6 +41,7 @@ def silent_explorer(taken=None, goals=None, begin=None):
         return action.Explore.Result()
 
     server = ActionServer(node, action.Explore, 'explore', hang, cancel_callback=lambda _goal: CancelResponse.ACCEPT)
+    node.create_service(Trigger, 'explorer/stop', lambda _request, answer: answer)
     executor = MultiThreadedExecutor(2, context=context)
     executor.add_node(node)
     thread = threading.Thread(target=lambda: (begin is None or begin.wait(60.0), executor.spin()))
@@ -132,3 +134,32 @@ def test_a_request_that_is_accepted_after_its_client_gave_up_is_cancelled_at_onc
         while not (goals and goals[0].is_cancel_requested):
             assert time.monotonic() < deadline_s
             time.sleep(0.01)
+
+
+def test_a_request_that_is_stopped_before_the_explorer_has_it_is_not_sent_or_cancelled_with_it():
+    begin, goals, looks = threading.Event(), [], []
+
+    def stopped():
+        looks.append(len(looks) > 1)  # not before the request is sent
+        if looks[-1]:
+            begin.set()
+        return looks[-1]
+
+    with silent_explorer(goals=goals, begin=begin), operators.Operator(domain_id=DOMAIN) as operator:
+        operator.wait_for_explorer(30.0)
+        with pytest.raises(MotionRefused, match='was stopped before it was sent'):
+            operator.explore(ExplorationRequest('linear_slide'), stopped=lambda: True)
+        with pytest.raises(MotionAborted, match='vanished'):  # this explorer never answers
+            operator.explore(ExplorationRequest('linear_slide'), stopped=stopped)
+        assert [one.is_cancel_requested for one in goals] == [True]
+
+
+def test_a_stop_that_is_not_answered_says_within_seconds_to_use_the_emergency_stop():
+    begin = threading.Event()
+    with silent_explorer(begin=begin), operators.Operator(domain_id=DOMAIN) as operator:
+        operator.wait_for_explorer(30.0)
+        begin_s = time.monotonic()
+        with pytest.raises(LaunchFailed, match='not answered the stop within 3 s; if the arm moves, use the emergency'):
+            operator.stop()
+        assert time.monotonic() - begin_s < 8.0
+        begin.set()

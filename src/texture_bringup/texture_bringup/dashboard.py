@@ -9,6 +9,7 @@ import concurrent.futures
 import contextlib
 import hmac
 import ipaddress
+import json
 import os
 import secrets
 import socket
@@ -70,7 +71,7 @@ class Access:
 
     def knows(self, given: str) -> bool:
         """Return whether a request carries the token, compared in constant time; True if none is needed."""
-        return not self.token or hmac.compare_digest(given.encode(), self.token.encode())
+        return not self.token or hmac.compare_digest(given.encode(errors='surrogatepass'), self.token.encode())
 
     def is_our_host(self, host: str) -> bool:
         """Return whether a Host header names this machine: an address, or one of its names.
@@ -84,8 +85,8 @@ class Access:
 
     def is_our_origin(self, headers: Mapping[str, str]) -> bool:
         """Return whether a request that changes something comes from this page, or from no page at all."""
-        origin = headers.get('Origin')
-        return origin is None or urlsplit(origin).netloc == headers.get('Host', '')
+        host = headers.get('Host', '')
+        return headers.get('Origin') in (None, f'http://{host}', f'https://{host}')
 
 
 def is_loopback(host: str) -> bool:
@@ -325,11 +326,12 @@ def _command(command: Callable[[Mapping[str, Any]], Awaitable[Answer]]) -> Handl
         if request.content_type != 'application/json':
             return _failure(415, f'the request is {request.content_type}; application/json is needed')
         try:
-            asked = parse_json(await asyncio.wait_for(request.text(), REQUEST_S))
+            asked = parse_json((await asyncio.wait_for(request.read(), REQUEST_S)).decode())
+            json.dumps(asked, ensure_ascii=False).encode()  # half a character, '\ud800', is a ValueError here
         except asyncio.TimeoutError:
             return _failure(408, f'the request was not complete within {REQUEST_S:g} s')
         except ValueError:
-            return _failure(400, 'the request is not JSON')
+            return _failure(400, 'the request is not JSON in UTF-8')
         if not isinstance(asked, dict):
             return _failure(400, 'the request is not a JSON object')
         try:

@@ -168,6 +168,8 @@ def command(node: NodeDescription, parameter_folder: Path) -> list[str]:
 # --------------------
 # One node as a separate process group, which ends with the launcher.
 
+# A line at WARN or above, the sentence of a user's error, the end of a traceback.
+FAULT = re.compile(r'\[(WARN|ERROR|FATAL)\]|texture: |[\w.]+(Error|Exception): ')
 CLOSE_S = 1.0  # for the last lines of a process that has ended; one that left the group may hold the pipe open
 
 
@@ -184,7 +186,7 @@ class RunningNode(subprocess.Popen[str]):
         self.node = node
         self.deaths = 0  # of processes of the same node before
         self.signals = 0  # stop signals sent so far
-        self.last = ''  # line that it wrote
+        self.fault = ''  # the last line that it wrote, if that is a warning or an error
         self._say = say
         self._ended_s = math.inf
         super().__init__(
@@ -205,8 +207,8 @@ class RunningNode(subprocess.Popen[str]):
     def _read(self) -> None:
         assert self.stdout is not None
         for line in self.stdout:
-            self.last = line.rstrip()
-            self._say(f'[{self.node.label}] {self.last}')
+            self.fault = line.rstrip() if FAULT.match(line) else ''
+            self._say(f'[{self.node.label}] {line.rstrip()}')
 
     def has_ended(self, now: float) -> bool:
         """Return whether it has ended and its last lines are shown; end what it has started itself."""
@@ -342,7 +344,7 @@ class Supervisor:
             self._due.append((time.monotonic() + node.respawn_delay_s, node, process.deaths + 1))
         elif needed and not stopping:
             self._say(f'[launch] {node.label} is required by the other nodes, which are stopped now')
-            self._cause = f'{node.label} {ending(code)}{f": {process.last}" * bool(code and process.last)}'
+            self._cause = f'{node.label} {ending(code)}{f": {process.fault}" * bool(code and process.fault)}'
             self.stop()
 
 

@@ -38,6 +38,7 @@ from texture_core.errors import (
     InvalidParameter,
     LaunchFailed,
     MotionAborted,
+    MotionRefused,
     TextureError,
 )
 from texture_core.ros import FEATURE_QOS, LEVELS, SENSOR_QOS, STATE_QOS, from_msg, has_ended, quality_of_service, to_msg
@@ -110,6 +111,9 @@ GONE_S = 4.0
 ACCEPT_S, CONFIRM_S = 15.0, 1.0
 # Time to find a service, and time for its answer: an arm needs seconds to recover, a tare up to 65 s.
 OFFERED_S, ANSWER_S = 10.0, 75.0
+STOP_S = 3.0
+EMERGENCY = 'if the arm moves, use the emergency stop of the robot'
+NOT_STOPPED = f'the explorer has not answered the stop within {STOP_S:g} s; {EMERGENCY}'
 SETTINGS_S = 10.0  # to find the parameters of a node
 RETRY_PERIOD_S = 5.0
 # What this process has discovered, the others discover soon after.
@@ -225,9 +229,15 @@ class Operator:
         self._settle()
 
     def explore(
-        self, request: ExplorationRequest, on_progress: Progress = lambda _state, _texture: None
+        self,
+        request: ExplorationRequest,
+        on_progress: Progress = lambda _state, _texture: None,
+        stopped: Callable[[], bool] = lambda: False,
     ) -> ExplorationResult:
-        """Explore, and return what was measured; Ctrl-C stops the exploration before it goes on."""
+        """Explore, and return what was measured; Ctrl-C stops the exploration before it goes on.
+
+        `stopped` says whether the explorer was told to stop, which may be before it has the request.
+        """
 
         def on_feedback(message: Any) -> None:
             self._heard_s = time.monotonic()
@@ -237,10 +247,15 @@ class Operator:
         self._states = self._states or self._node.create_subscription(*hear, raw=True)
         goal_id = GoalInfo().goal_id
         goal_id.uuid = list(uuid4().bytes)
+        if stopped():
+            raise MotionRefused('the request was stopped before it was sent', ExplorationError.STOPPED)
         accepted = self._explore.send_goal_async(action.Explore.Goal(request=to_msg(request)), on_feedback, goal_id)
         silent = 'the explorer accepts no request; stop it, and check that no second one runs'
         try:
-            self.wait_until(accepted.done, ACCEPT_S, silent, MotionAborted)
+            self.wait_until(lambda: accepted.done() or stopped(), ACCEPT_S, silent, MotionAborted)
+            if stopped():
+                self._withdraw(goal_id)
+                self.wait_until(accepted.done, ACCEPT_S, silent, MotionAborted)
         except MotionAborted as error:
             withdrawn = self._withdraw(goal_id)
             self._executor.spin_until_future_complete(withdrawn, CONFIRM_S)
@@ -302,7 +317,8 @@ class Operator:
 
     def stop(self) -> str:
         """Stop any motion; return the message of the explorer."""
-        return self.call('explorer/stop', 'start an explorer')[1]
+        answer = self._ask(Trigger, 'explorer/stop', Trigger.Request(), NOT_STOPPED, NOT_STOPPED, answer_s=STOP_S)
+        return str(answer.message)
 
     def call(self, service: str, advice: str) -> tuple[bool, str]:
         """Call a `Trigger`; return whether it succeeded, and its message; `advice` is for a missing service."""
@@ -376,13 +392,13 @@ class Operator:
             raise InvalidData(answer.message)
         return answer
 
-    def _ask(self, kind: Any, name: str, request: Any, missing: str, silent: str) -> Any:
+    def _ask(self, kind: Any, name: str, request: Any, missing: str, silent: str, *, answer_s: float = ANSWER_S) -> Any:
         """Return the answer of a service; the sentences are for one that nobody offers, and one without an answer."""
         client = self._node.create_client(kind, name)
         try:
             self.wait_until(client.service_is_ready, OFFERED_S, missing)
             future = client.call_async(request)
-            self.wait_until(future.done, ANSWER_S, silent)
+            self.wait_until(future.done, answer_s, silent)
         finally:
             self._node.destroy_client(client)
         return future.result()
@@ -449,8 +465,9 @@ class Operator:
         """Cancel, wait until the finger is lifted, and return in a sentence how it ended."""
         goal.cancel_goal_async()
         deadline = time.monotonic() + CANCEL_DEADLINE_S
-        while not ending.done() and time.monotonic() < deadline:
-            self._executor.spin_once(timeout_sec=STEP_S)
+        with task(f'waiting for the end of the exploration; {EMERGENCY}'):
+            while not ending.done() and time.monotonic() < deadline:
+                self._executor.spin_once(timeout_sec=STEP_S)
         if not ending.done():
             return _unconfirmed()
         return f'the exploration has ended: {ending.result().result.result.message}'

@@ -1,10 +1,14 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
+import importlib
+import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import pytest
 
-from texture_core.errors import DeviceError, ExplorationError, MotionRefused
+from texture_core.errors import DeviceError, ExplorationError, MotionRefused, UnknownName
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.simulated import SimulatedArm
 from texture_exploration.explorer import Explorer
@@ -36,6 +40,10 @@ def test_a_fault_in_a_users_planner_is_told_with_its_file_and_line(explorer, tmp
     file = tmp_path / 'users_planner.py'
     file.write_text('def plan(*_):\n    return 1 / 0\n')
     monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(UnknownName, match="no motion 'users_planner:plan'"):
+        explorer.begin('one', ExplorationRequest('users_planner:plan'))
+    assert 'users_planner' not in sys.modules  # a request over the network chooses no import
+    explorer.motions = {'users_planner:plan': importlib.import_module('users_planner').plan}
     with pytest.raises(MotionRefused) as refused:
         explorer.begin('one', ExplorationRequest('users_planner:plan'))
     assert refused.value.error == ExplorationError.INVALID_REQUEST
@@ -72,11 +80,42 @@ def test_a_start_outside_names_every_axis_at_once_and_a_finger_brought_inside_be
 def test_stopping_lifts_the_finger(explorer):
     explorer.table.gate.clear()
     exploration = explorer.begin('one', SLOW)
-    assert explorer.stop('enough')
+    assert explorer.stop('enough') == 'stopping; the finger is being lifted'
     explorer.table.gate.set()
     assert exploration.ended.wait(DEADLINE_S)
     assert (exploration.outcome.message, explorer.counts['aborted']) == ('enough', 1)
-    assert not explorer.stop('again')
+    assert explorer.stop('again') == 'nothing is moving'
+
+
+@pytest.mark.parametrize(
+    ('cancelled', 'ends'),
+    [
+        (False, [ExplorationError.STOPPED, ExplorationError.STOPPED, ExplorationError.INVALID_REQUEST]),
+        (True, [ExplorationError.CANCELLED]),
+    ],
+)
+def test_a_request_that_is_stopped_or_cancelled_while_it_waits_or_is_prepared_moves_nothing(
+    explorer, monkeypatch, cancelled, ends
+):
+    connecting, connected, connect = threading.Event(), threading.Event(), explorer.arm.connect
+    monkeypatch.setattr(explorer.arm, 'connect', lambda: (connecting.set(), connected.wait(60.0), connect()))
+    explorer.arm.fail('protective stop')
+    withdrawn = threading.Event()
+    with ThreadPoolExecutor() as pool:
+        asked = [pool.submit(explorer.begin, 'one', QUICK, withdrawn.is_set)]
+        assert connecting.wait(60.0)
+        if cancelled:
+            withdrawn.set()
+        else:  # two wait for the first one
+            asked += [pool.submit(explorer.begin, 'two', QUICK), pool.submit(explorer.lift)]
+            while len(explorer._requests) < len(asked):
+                pass
+            explorer.table.now_ns += 1
+            assert explorer.stop('enough') == 'nothing is moving; what was requested is cancelled'
+        connected.set()
+        assert [one.exception(60.0).error for one in asked] == ends
+    assert (explorer.table.states, explorer.current) == ([], None)
+    assert explorer.begin('three', QUICK).ended.wait(DEADLINE_S)
 
 
 def test_an_arm_that_failed_is_connected_again_by_the_next_request(explorer):

@@ -260,6 +260,20 @@ def test_a_stop_in_the_slide_lifts_the_finger_and_answers_the_service_that_waits
     response = world.result(call).result
     assert (response.error_code, response.lifted) == (Result.ERROR_STOPPED, True)
     assert response.message == 'stopped on request'
+    call, stopping = world.call(**SLOW), stop.call_async(Trigger.Request())  # at once: the stop may be read first
+    assert world.result(call).result.error_code == Result.ERROR_STOPPED
+    world.result(stopping)
+    assert world.explored(**QUICK).exploration_id
+
+
+def test_a_request_may_name_a_motion_of_another_package_if_the_parameters_do(make_world, tmp_path, monkeypatch):
+    (tmp_path / 'users_slides.py').write_text('from texture_exploration.motions import linear_slide as slide\n')
+    monkeypatch.syspath_prepend(tmp_path)
+    world = make_world(motions='users_slides:slide')
+    assert world.explored(**{**QUICK, 'motion': 'users_slides:slide'}).exploration_id
+    response = world.explored(motion='users_slides:linear_slide')
+    assert response.error_code == Result.ERROR_UNKNOWN_MOTION
+    assert 'Known: circular, cross_slide, in_hand_sliding, linear_slide, users_slides:slide' in response.message
 
 
 def cork(state, **values):

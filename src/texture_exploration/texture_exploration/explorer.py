@@ -9,16 +9,17 @@ import math
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict
 
-from texture_core.config import find, place_of
+from texture_core.config import look_up, place_of
 from texture_core.errors import DeviceError, ExplorationError, InvalidData, MotionAborted, MotionRefused, TextureError
 from texture_core.types import ExplorationRequest, ExplorationState
 from texture_exploration.arms.arm import Arm, SurfaceFrame, Vector
 from texture_exploration.exploration import Exploration, arm_fault, no_signal_watch
 from texture_exploration.guards import Listening, sound
 from texture_exploration.lift_first import Rise
+from texture_exploration.motion import Planner
 from texture_exploration.motions import MOTIONS
 from texture_exploration.safety import SafetyLimits, SurfacePatch
 from texture_exploration.surface import TOUCHES, SurfaceTouches
@@ -37,8 +38,8 @@ class Explorer:
     """Own an arm, not yet connected, and explore with it.
 
     `on_state` is called with each state of each exploration, in the thread that moves; its stamps are of `clock`,
-    CLOCK_MONOTONIC in ns. `signal_fault` watches over the sensor. What cannot be done now raises MotionRefused, an arm
-    that cannot be reached DeviceError.
+    CLOCK_MONOTONIC in ns. `signal_fault` watches over the sensor; a request names one of `motions`. What cannot be done
+    now raises MotionRefused, an arm that cannot be reached DeviceError.
     """
 
     def __init__(
@@ -50,8 +51,9 @@ class Explorer:
         clock: Callable[[], int] = time.monotonic_ns,
         *,
         signal_fault: Callable[[Listening], str] = no_signal_watch,
+        motions: Mapping[str, Planner] = MOTIONS,
     ) -> None:
-        self.arm = arm
+        self.arm, self.motions = arm, motions
         # These may be replaced; a running exploration keeps those of its start.
         self.touch, self.limits, self.patch = touch, limits, SurfacePatch()
         self.counts: Counter[str] = Counter(done=0, aborted=0, refused=0, internal_errors=0, late_steps=0)
@@ -66,7 +68,8 @@ class Explorer:
         self._current: Exploration | None = None
         self._thread: threading.Thread | None = None
         self._refuses = ''  # in a sentence, why requests are refused
-        self._lift_ends = threading.Event()
+        self._stopped_ns = clock()  # what was requested before it is refused
+        self._requests: list[int] = []  # when those came that wait for the arm, are prepared, or lift
         self._touches = SurfaceTouches()
 
     def connect(self) -> Vector:
@@ -119,11 +122,28 @@ class Explorer:
         current = self._current
         return current if current is not None and not current.ended.is_set() else None
 
-    def begin(self, exploration_id: str, request: ExplorationRequest) -> Exploration:
-        """Begin an exploration in a separate thread; wait for its event `ended`."""
-        with self._lock:
+    @contextlib.contextmanager
+    def _turn(self) -> Iterator[Callable[[], bool]]:
+        """Wait until no other request is at work; the function says whether this one was stopped since it came."""
+        came_ns = self.clock()
+        self._requests.append(came_ns)
+        try:
+            with self._lock:
+                yield lambda: self._stopped_ns > came_ns
+        finally:
+            self._requests.remove(came_ns)
+
+    def begin(
+        self, exploration_id: str, request: ExplorationRequest, cancelled: Callable[[], bool] = lambda: False
+    ) -> Exploration:
+        """Begin an exploration in a separate thread, unless it was stopped or cancelled; wait for its event `ended`."""
+        with self._turn() as stopped:
             try:
-                exploration = self._prepare(exploration_id, request)
+                self._current = exploration = self._prepare(exploration_id, request)  # what `stop` now finds
+                if stopped() or cancelled():
+                    self._current = None
+                    error = ExplorationError.STOPPED if stopped() else ExplorationError.CANCELLED
+                    raise MotionRefused(f'the request was {error.name.lower()} before anything moved', error)
             except TextureError:
                 self.counts['refused'] += 1
                 raise
@@ -133,21 +153,21 @@ class Explorer:
                 raise MotionRefused(
                     f"planning '{request.motion}' failed with {why}; correct it there", ExplorationError.INVALID_REQUEST
                 ) from error
-            self._current, self.lifted = exploration, False
+            self.lifted = False
             self._thread = threading.Thread(target=self._run, args=(exploration,), name='exploration', daemon=True)
             self._thread.start()
             return exploration
 
-    def stop(self, reason: str) -> bool:
-        """Abort the running exploration; return whether there was one. Without one, the arm is at rest."""
-        self._lift_ends.set()
-        current = self.current
-        if current is None:
-            with contextlib.suppress(DeviceError):
-                self.arm.stop()
-            return False
-        current.stop(reason)
-        return True
+    def stop(self, reason: str, covers_s: float = 0.0) -> str:
+        """Abort the exploration and all requests that came before or come within `covers_s`; return a sentence."""
+        self._stopped_ns = self.clock() + round(covers_s * 1e9)
+        waiting = '; what was requested is cancelled' if self._requests else ''
+        if (current := self.current) is not None:
+            current.stop(reason)
+            return 'stopping; the finger is being lifted'
+        with contextlib.suppress(DeviceError):
+            self.arm.stop()
+        return f'nothing is moving{waiting}'
 
     def recover(self) -> None:
         """Free the arm from a fault by connecting again; the caller makes sure that it may move.
@@ -167,9 +187,8 @@ class Explorer:
 
         The caller makes sure that the finger may rise; `stop` ends it.
         """
-        with self._lock:
+        with self._turn() as stopped:
             self._check_idle()
-            self._lift_ends.clear()
             if self._home is None or self.fault():
                 self._home = self.connect()
             begin_m = self.arm.state().position[2]
@@ -177,7 +196,7 @@ class Explorer:
             rise.begin(self.clock(), self.arm.state())
             try:
                 while (command := rise.timed_step(self.clock(), self.arm.state())) is not None:
-                    if self._lift_ends.is_set():
+                    if stopped():
                         raise MotionAborted('it was stopped')
                     self.arm.command(command)
                     pace()
@@ -251,7 +270,7 @@ class Explorer:
         self._end_motion('the explorer was shut down', 'the explorer is shutting down')
 
     def _end_motion(self, reason: str, refuses: str) -> None:
-        self._lift_ends.set()
+        self._stopped_ns = self.clock()
         with self._lock:
             self._refuses = refuses
         self.stop(reason)
@@ -261,7 +280,7 @@ class Explorer:
 
     def _prepare(self, exploration_id: str, request: ExplorationRequest) -> Exploration:
         self._check_idle()
-        plan = find(MOTIONS, request.motion, 'motion')
+        plan = look_up(self.motions, request.motion, 'motion')
         start = self.patch.start(request, self._ready(), self.limits)
         self._check_inside(start)
         limits = self.patch.within(self.limits) if request.use_start else self.limits

@@ -143,7 +143,7 @@ def cross_slide(request: ExplorationRequest, home: Vector, touch: TouchParams, l
 # --------------------
 # All motions by name.
 
-MOTIONS: Mapping[str, Planner] = {
+MOTIONS: dict[str, Planner] = {
     'linear_slide': linear_slide,  # ETS, Jamali & Sammut 2010, Hu et al. 2014
     'circular': circular,  # ETS
     'cross_slide': cross_slide,  # Hu et al. 2014: along x and along y

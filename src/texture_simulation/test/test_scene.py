@@ -20,6 +20,8 @@ from texture_simulation.surfaces import KINDS
 def test_an_unknown_surface_or_scene_gets_the_nearest_name() -> None:
     with pytest.raises(UnknownName, match="did you mean 'ridge_1mm'"):
         load_scene('twelve_textures').surface('ridge_1m')
+    with pytest.raises(UnknownName, match="no surface 'numpy:sqrt'"):  # `texture set` names it over the network
+        load_scene('twelve_textures').surface('numpy:sqrt')
     with pytest.raises(UnknownName, match="did you mean 'twelve_textures'"):
         load_scene('twelve_texture')
 

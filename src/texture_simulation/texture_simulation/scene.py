@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from texture_core.config import find, find_file, from_mapping, load_yaml, param, safe_repr
+from texture_core.config import find, find_file, from_mapping, load_yaml, look_up, param, safe_repr
 from texture_core.errors import InvalidParameter
 from texture_simulation.effects import EFFECTS
 from texture_simulation.friction import FRICTIONS
@@ -72,7 +72,7 @@ class Scene:
 
     def surface(self, name: str) -> Surface:
         """Return a surface by name; UnknownName with the nearest one if there is none."""
-        return find(self.surfaces, name, 'surface')
+        return look_up(self.surfaces, name, 'surface')
 
     def effects_of(self, stage: str) -> list[Any]:
         """Return the effects that have the method of a stage (see effects.py), in the order of the catalogue."""
@@ -94,7 +94,7 @@ class Scene:
 
     def without(self, effect: str) -> Scene:
         """Return the same scene with one of its effects off."""
-        find(self.effects, effect, 'effect of this scene')
+        look_up(self.effects, effect, 'effect of this scene')
         return replace(self, effects={name: kept for name, kept in self.effects.items() if name != effect})
 
 

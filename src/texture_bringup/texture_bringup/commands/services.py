@@ -19,6 +19,12 @@ EXPLORER_MISSING = 'start an explorer, such as the emulator with `texture launch
 TOUCHES_MISSING = "the launch files 'ur' and 'ros_controllers' offer it; start one of them, or give its --namespace"
 
 
+def _stop(options: argparse.Namespace) -> int:
+    with Operator(options.namespace) as operator:
+        print(operator.stop())
+    return 0
+
+
 def trigger(summary: str, service: str, advice: str = EXPLORER_MISSING) -> Command:
     """Return the sub-command that calls a service; `advice` is the remedy when no node offers it."""
 
@@ -31,11 +37,7 @@ def trigger(summary: str, service: str, advice: str = EXPLORER_MISSING) -> Comma
     return Command(summary, add_namespace, run)
 
 
-stop = trigger(
-    'end the exploration and lift the finger, from any phase',
-    'explorer/stop',
-    'no explorer runs there; if the robot moves, use its emergency stop and check whether the finger presses',
-)
+stop = Command('end the exploration and lift the finger, from any phase', add_namespace, _stop)
 recover = trigger('free the arm from a fault', 'explorer/recover')
 lift = trigger('lift a finger that was left pressed on the surface', 'explorer/lift')
 touch_surface = trigger('take one touch of the surface calibration', 'explorer/touch_surface', TOUCHES_MISSING)

@@ -10,7 +10,7 @@ import json
 import signal
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from functools import partial
@@ -23,15 +23,15 @@ from texture_msgs import msg
 
 from texture_bringup.dashboard import Access, Recorder, Serving, make_app
 from texture_bringup.feed import FRAME_PERIOD_S, Feed
-from texture_bringup.operator import Operator, subscribe
+from texture_bringup.operator import NOT_STOPPED, STOP_S, Operator, subscribe
 from texture_core.config import folder, from_mapping, param
-from texture_core.errors import InvalidData, InvalidParameter, LaunchFailed
+from texture_core.errors import InvalidData, InvalidParameter, LaunchFailed, MotionRefused
 from texture_core.ros import DiagnosticReport, Diagnostics, declare, quality_of_service, run
 from texture_core.types import ExplorationRequest, checked_label
 from texture_features.correction import read_reference
 
 T = TypeVar('T')
-EXPLORER_S, ANSWER_DEADLINE_S, POLL_S = 5.0, 30.0, 0.02
+EXPLORER_S, POLL_S = 5.0, 0.02
 MAX_CHARACTERS = 200
 
 
@@ -60,6 +60,7 @@ class DashboardNode(Node):
         self._closing = False
         self._recordings = Path(params.recordings).expanduser()
         self._command: asyncio.subprocess.Process | None = None
+        self._moving: set[object] = set()  # what was asked for since the last stop, until it is over
         self._recorder = Recorder(self._recordings, self.get_namespace())
         self._stop = self.create_client(Trigger, 'explorer/stop')
         access = Access.to_this_machine(params.host)
@@ -75,9 +76,7 @@ class DashboardNode(Node):
     def shutdown(self) -> None:
         """Complete a recording, stop a sub-command, and close the page."""
         self._closing = True
-        if self._command is not None:
-            with contextlib.suppress(ProcessLookupError):
-                self._command.send_signal(signal.SIGINT)
+        self._interrupt()
         self._recorder.end()  # first: the recorder ends with the thread of the server that started it
         self._serving.close()
 
@@ -91,24 +90,27 @@ class DashboardNode(Node):
 
         def explore(operator: Operator) -> Mapping[str, Any]:
             operator.wait_for_explorer(EXPLORER_S)
-            result = operator.explore(request)
+            result = operator.explore(request, stopped=stopped)
+            if not result.exploration_id:
+                raise MotionRefused(result.message, result.error)
             return {'success': result.success, 'message': result.message, 'id': result.exploration_id}
 
-        return await self._operate(explore)
+        with self._until_stopped() as stopped:
+            return await self._operate(explore)
 
     async def stop(self, _requested: Mapping[str, Any]) -> Mapping[str, Any]:
         """Stop what moves, by a client that exists all the time: here nothing is waited for that can be avoided."""
-        found_s = time.monotonic() + EXPLORER_S
-        while not self._stop.service_is_ready():
-            if time.monotonic() > found_s:
-                raise LaunchFailed('no explorer answers; is it running?')
-            await asyncio.sleep(POLL_S)
-        future, deadline_s = self._stop.call_async(Trigger.Request()), time.monotonic() + ANSWER_DEADLINE_S
-        while not future.done():
+        cancelled = '; what this page requested is cancelled' if self._moving else ''
+        self._moving.clear()
+        self._interrupt()
+        future, deadline_s = None, time.monotonic() + STOP_S
+        while future is None or not future.done():
+            if future is None and self._stop.service_is_ready():
+                future = self._stop.call_async(Trigger.Request())
             if time.monotonic() > deadline_s:
-                raise LaunchFailed(f'no answer within {ANSWER_DEADLINE_S:.0f} s')
+                raise LaunchFailed(f'{NOT_STOPPED}{cancelled}')
             await asyncio.sleep(POLL_S)
-        return {'success': future.result().success, 'message': future.result().message}
+        return {'success': future.result().success, 'message': f'{future.result().message}{cancelled}'}
 
     async def tare(self, _asked: Mapping[str, Any]) -> Mapping[str, Any]:
         """Take the present level of the sensor as that without load."""
@@ -120,18 +122,20 @@ class DashboardNode(Node):
 
     async def check(self, _asked: Mapping[str, Any]) -> Mapping[str, Any]:
         """Slide over the reference plate, and compare it with that of the training of the classifier's model."""
-        [path] = await self._operate(lambda operator: operator.parameters('classifier', ['model']))
-        if not path:
-            raise InvalidParameter('the classifier has no model whose reference could be compared; start it with one')
-        read_reference(path)  # without one nothing need move
-        return await self._run('check', path)
+        with self._until_stopped() as stopped:
+            [path] = await self._operate(lambda operator: operator.parameters('classifier', ['model']))
+            if not path:
+                raise InvalidParameter('the classifier has no model to compare the finger with; start it with one')
+            read_reference(path)  # without one nothing need move
+            return await self._run(stopped, 'check', path)
 
     async def collect(self, asked: Mapping[str, Any]) -> Mapping[str, Any]:
         """Record labelled slides at many places of the taught patch, into the folder `surfaces` of the recordings."""
         surface = checked_label(_short(str(asked.get('surface', ''))))
         if not surface or surface.startswith('-'):
             raise InvalidParameter('the surface to collect has no name; give one')
-        return await self._run('collect', surface, str(self._recordings / 'surfaces'))
+        with self._until_stopped() as stopped:
+            return await self._run(stopped, 'collect', surface, str(self._recordings / 'surfaces'))
 
     async def add(self, asked: Mapping[str, Any]) -> Mapping[str, Any]:
         """Add an exploration, the last one if it has no id, or remove the last added slide."""
@@ -179,7 +183,22 @@ class DashboardNode(Node):
         fault = self._recorder.fault
         return 'WARN' if fault or self._bad else 'OK', fault or 'the page is served', {'bad_messages': self._bad}
 
-    async def _run(self, name: str, *arguments: str) -> Mapping[str, Any]:
+    @contextlib.contextmanager
+    def _until_stopped(self) -> Iterator[Callable[[], bool]]:
+        """Note something that moves the arm until it is over; the function says whether Stop was pressed since."""
+        one = object()
+        self._moving.add(one)
+        try:
+            yield lambda: one not in self._moving
+        finally:
+            self._moving.discard(one)
+
+    def _interrupt(self) -> None:
+        if self._command is not None:
+            with contextlib.suppress(ProcessLookupError):
+                self._command.send_signal(signal.SIGINT)
+
+    async def _run(self, stopped: Callable[[], bool], name: str, *arguments: str) -> Mapping[str, Any]:
         """Run a sub-command of `texture`, one at a time; the page shows each line of it, the last at its end."""
         if self._feed.working:
             raise InvalidParameter(f'the page already runs: {self._feed.working}; wait for it, or press Stop')
@@ -191,6 +210,8 @@ class DashboardNode(Node):
             self._command = await asyncio.create_subprocess_exec(
                 *command, '--namespace', namespace, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT
             )
+            if stopped():
+                self._interrupt()
             assert self._command.stdout is not None
             async for output in self._command.stdout:
                 line = output.decode(errors='replace').strip().removeprefix('texture: ') or line
@@ -201,7 +222,9 @@ class DashboardNode(Node):
 
     async def _call(self, service: str, advice: str) -> Mapping[str, Any]:
         success, message = await self._operate(lambda operator: operator.call(service, advice))
-        return {'success': success, 'message': message}
+        if not success:
+            raise MotionRefused(message)
+        return {'success': True, 'message': message}
 
     async def _operate(self, work: Callable[[Operator], T]) -> T:
         """Let an operator do something in another thread; it is left when the page closes."""

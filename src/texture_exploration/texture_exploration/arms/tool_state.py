@@ -73,7 +73,7 @@ class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams):
         0.0, 'Time constant of the low-pass filter of the force; it delays the loop.', unit='s', low=0.0, high=0.1
     )
     connect_timeout_s: float = param(
-        5.0, 'How long the first pose, the first force and the controller may take.', unit='s', low=0.1, high=60.0
+        10.0, 'How long the first pose, the first force and the controller may take.', unit='s', low=0.1, high=60.0
     )
 
     def __post_init__(self) -> None:

@@ -75,6 +75,7 @@ STATIC_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 FEEDBACK_PERIOD_S = 0.05
 IDLE_PERIOD_S = 1.0
 ESTIMATE_PERIOD_S = 0.005
+STOP_COVERS_S = 0.2  # a request that comes so soon after a stop may have been sent before it
 PRESSED = (
     'the force sensor shows {:.1f} N, so the finger may press, as after an explorer that was killed: `texture lift` '
     'lifts it now, and the first exploration does so'
@@ -94,6 +95,9 @@ class ExplorerParams:
     )
     estimate_timeout_s: float = param(
         1.0, 'How long to wait for the final estimates after the lift; above 0.3 s.', unit='s', low=0.0, high=60.0
+    )
+    motions: str = param(
+        '', "Motions of other packages that a request may name, as 'module:function', separated by spaces."
     )
     surface_frame_id: str = param(
         'surface',
@@ -121,7 +125,7 @@ class ExplorerNode(PatientLifecycleNode):
         params = declare(self, ExplorerParams)
         self._estimate_timeout_s, self._autostart = params.estimate_timeout_s, params.autostart
         self._surface_frame_id = frame_name(self.get_namespace(), params.surface_frame_id)
-        self._explorer = self._make_explorer(params.arm)
+        self._explorer = self._make_explorer(params)
         self._transforms = self.create_publisher(TFMessage, '/tf_static', STATIC_QOS)
         self._broadcast_surface()
         self._rng, self._numbers = np.random.default_rng(), itertools.count(1)
@@ -235,10 +239,13 @@ class ExplorerNode(PatientLifecycleNode):
         """Parameters of all arms: one file may serve several, and some names of one are near to ours."""
         return {item.name for arm in ARMS.values() for item in parameters_of(arm.Params)}
 
-    def _make_explorer(self, arm_name: str) -> Explorer:
-        arm_class = find(ARMS, arm_name, 'arm')
+    def _make_explorer(self, params: ExplorerParams) -> Explorer:
+        arm_class = find(ARMS, params.arm, 'arm')
         arm = arm_class(declare(self, arm_class.Params))
-        explorer = Explorer(arm, TouchParams(), SafetyLimits(), self._on_state, signal_fault=self._watch_signal())
+        motions = MOTIONS | {name: find(MOTIONS, name, 'motion') for name in params.motions.split()}
+        explorer = Explorer(
+            arm, TouchParams(), SafetyLimits(), self._on_state, signal_fault=self._watch_signal(), motions=motions
+        )
         # Changed parameters hold from the next exploration on; those of arm and sensor are fixed.
         for name, kind in (('touch', TouchParams), ('limits', SafetyLimits), ('patch', SurfacePatch)):
             setattr(explorer, name, declare(self, kind, changeable=True))
@@ -266,11 +273,13 @@ class ExplorerNode(PatientLifecycleNode):
         return watch.signal_fault
 
     def _on_service(self, request: srv.Explore.Request, response: srv.Explore.Response) -> srv.Explore.Response:
-        response.result = self._explore(request.request, lambda exploration: exploration.ended.wait())
+        response.result = self._explore(request.request, lambda exploration: exploration.ended.wait(), lambda: False)
         return response
 
     def _on_goal(self, goal: Any) -> action.Explore.Result:
-        result = self._explore(goal.request.request, partial(self._give_feedback, goal))
+        result = self._explore(
+            goal.request.request, partial(self._give_feedback, goal), lambda: bool(goal.is_cancel_requested)
+        )
         if goal.is_cancel_requested:
             goal.canceled()
         elif result.error_code == msg.ExplorationResult.ERROR_NONE:
@@ -279,13 +288,15 @@ class ExplorerNode(PatientLifecycleNode):
             goal.abort()
         return action.Explore.Result(result=result)
 
-    def _explore(self, request: msg.ExplorationRequest, wait: Callable[[Exploration], None]) -> msg.ExplorationResult:
+    def _explore(
+        self, request: msg.ExplorationRequest, wait: Callable[[Exploration], None], cancelled: Callable[[], bool]
+    ) -> msg.ExplorationResult:
         """Begin, wait until the finger is lifted, and return the result for the service or the action."""
         result = msg.ExplorationResult()
         try:
             exploration_id = new_id(self.get_clock().now().nanoseconds, next(self._numbers), self._rng)
             self._check_clock()
-            exploration = self._explorer.begin(exploration_id, from_msg(request))
+            exploration = self._explorer.begin(exploration_id, from_msg(request), cancelled)
         except TextureError as error:
             result.error_code, result.message = int(refusal(error)), str(error)
             result.field = 'motion' if isinstance(error, UnknownName) else error.field
@@ -358,8 +369,9 @@ class ExplorerNode(PatientLifecycleNode):
         self.create_service(Trigger, name, answer, callback_group=group)
 
     def _stop(self) -> str:
-        stopped = self._explorer.stop('stopped on request')
-        return 'stopping; the finger is being lifted' if stopped else 'nothing is moving'
+        message = self._explorer.stop('stopped on request', STOP_COVERS_S)
+        time.sleep(STOP_COVERS_S)  # what is requested after the answer is not covered
+        return message
 
     def _recover(self) -> str:
         self._explorer.recover()
@@ -412,7 +424,7 @@ class ExplorerNode(PatientLifecycleNode):
         """Publish what the explorer can do, if that has changed."""
         limits, why_not = self._explorer.limits, self._why_not_ready()
         info = msg.ExplorerInfo(ready=not why_not, message=why_not, last_error_code=int(self._last_error))
-        info.motions = list(MOTIONS)
+        info.motions = list(self._explorer.motions)
         for motion, defaults in DEFAULTS.items():
             for name, value in defaults.items():
                 low, high, unit = limits.range(name)

@@ -26,6 +26,7 @@ from rclpy.signals import SignalHandlerOptions
 from texture_core.errors import DeviceError
 from texture_core.ros import to_ns
 from texture_exploration.arms.arm import Vector, claim, give_up_when_ending
+from texture_exploration.arms.ros_controllers import NOT_FOUND
 from texture_exploration.arms.tool_state import ForceSample, PoseSample, RosControllersParams
 from texture_exploration.ros.guard import MEASURED_QOS, TwistGuard, ignore, newest, participant, scope, sender, stamped
 
@@ -37,6 +38,11 @@ ANNOUNCED_S = 3.0  # period in which participants announce themselves (rmw_fastr
 # For this time after the controller was found, no other publisher may appear, also on this machine: a participant finds
 # the publishers of another only when that one announces itself again, if the first messages between both were lost.
 ALONE_S = 2 * ANNOUNCED_S
+GUARD_START_S = 60.0  # next to 15 busy processes a core it took 33 s
+NO_GUARD = (
+    f'the guard process, which would stop the arm if this process dies, has not started within {GUARD_START_S:g} s; '
+    'reduce the load of this machine, and request again'
+)
 NO_TIMEOUT = (
     "the controller on '{topic}' declares no timeout ('controller_timeout_s' is 0): it may keep executing the last "
     "velocity if this machine or its network fails. Set its timeout, or set 'accept_no_timeout: true' once the safety "
@@ -87,7 +93,13 @@ class RosTopics:
         self._forces = node.create_subscription(WrenchStamped, params.wrench_topic, ignore, MEASURED_QOS)
         self._frame_id = params.twist_frame_id or params.base_frame_id
         topics = (self._twists.topic_name, self._frame_id, self._poses.topic_name)
-        self._guard = TwistGuard(node.get_namespace(), topics, self._lock)
+        self._guard = guard = TwistGuard(node.get_namespace(), topics, self._lock)
+        end_s = time.monotonic() + GUARD_START_S
+        while not (guard.fault() or guard.participant):  # the time of the controllers begins when it runs
+            give_up_when_ending()
+            if time.monotonic() > end_s:
+                raise DeviceError(NO_GUARD)
+            time.sleep(LOOKING_S)
         if not (params.controller_timeout_s or scope()):
             node.get_logger().warning(
                 "'accept_shared_group' is true: what ends the whole control group of this process, as stopping a "
@@ -158,10 +170,7 @@ class RosTopics:
                 if now_s - begin_s > self._params.connect_timeout_s:
                     if other:
                         raise DeviceError(f'{other}; end it first. ROS forgets one that was killed after 20 s')
-                    raise DeviceError(
-                        f"no node subscribes to '{topic}'. Check that the controller is active, and that ROS_DOMAIN_ID "
-                        'and ROS_AUTOMATIC_DISCOVERY_RANGE are those of the robot'
-                    )
+                    raise DeviceError(f"no node subscribes to '{topic}'{NOT_FOUND}")
             else:
                 alone_s = alone_s or now_s
                 if now_s - alone_s >= ALONE_S:
@@ -177,12 +186,12 @@ class RosTopics:
 
     def close(self) -> None:
         """Wait until what was sent has arrived, and leave; the guard stays until an arm that may still move rests."""
-        assert self._guard is not None
         self._twists.wait_for_all_acked(Duration(seconds=ARRIVAL_S))
-        self._guard.leave()
         self._leave()
 
     def _leave(self) -> None:
+        if self._guard is not None:
+            self._guard.leave()
         self._node.destroy_node()
         rclpy.try_shutdown(context=self._context)
         if self._lock >= 0:
