@@ -183,7 +183,10 @@ class Operator:
         """Wait until explorations can be requested; the wait is shown after `quiet_s`."""
         advice = 'start one, such as the emulator with `texture launch emulator`'
         with task(f'waiting for an explorer; {advice}', quiet_s=quiet_s):
-            self._until(self._explore.server_is_ready, deadline_s, f'no explorer answers; {advice}')
+            try:
+                self._until(self._explore.server_is_ready, deadline_s, f'no explorer answers; {advice}')
+            except KeyboardInterrupt:
+                raise KeyboardInterrupt('nothing was requested') from None
 
     def wait_for_node(self, name: str, deadline_s: float) -> None:
         """Wait until a node of the namespace is there."""
@@ -200,14 +203,16 @@ class Operator:
         finally:
             self._node.destroy_subscription(subscription)
 
-    def wait_for_listeners(self, topics: Sequence[str], number: int, guard: Callable[[], None]) -> None:
+    def wait_for_listeners(
+        self, topics: Sequence[str], number: int, guard: Callable[[], None], who: str = 'a node'
+    ) -> None:
         """Wait until topics have `number` subscriptions and these are discovered; `guard` is called meanwhile."""
 
         def all_listen() -> bool:
             guard()
             return all(self.listeners(topic) >= number for topic in topics)
 
-        self._until(all_listen, LISTENERS_DEADLINE_S, f'no node subscribes to {", ".join(topics)}')
+        self._until(all_listen, LISTENERS_DEADLINE_S, f'{who} has not subscribed to {", ".join(topics)} yet')
         self._settle()
 
     def listeners(self, topic: str) -> int:

@@ -72,6 +72,16 @@ def test_unlabelled_slides_are_left_out_and_a_bag_without_labels_is_refused(tmp_
         find_slides([write(tmp_path / 'none', ['', ''], start_s=0)])
 
 
+def test_an_empty_bag_among_others_is_named_and_skipped(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    write(tmp_path / 'cork', ['cork'], start_s=0)
+    with BagWriter(tmp_path / 'cork-2'):
+        pass
+    assert [slide.bag.name for slide in find_slides([tmp_path])] == ['cork']
+    assert f"the bag '{tmp_path / 'cork-2'}' has no labelled slide" in caplog.text
+    with pytest.raises(InvalidData, match='is labelled'):
+        find_slides([tmp_path / 'cork-2'])
+
+
 def test_slides_that_no_surface_has_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InvalidData, match='there are 1 to 2'):
         find_slides([write(tmp_path / 'bag', ['cork', 'cork'], start_s=0)], '30-40')
