@@ -55,6 +55,12 @@ def data(tmp_path_factory):
     return folder
 
 
+@pytest.fixture(autouse=True)
+def quiet(monkeypatch):
+    """Show no progress, however busy this machine is."""
+    monkeypatch.setattr('texture_core.cli.QUIET_S', 600.0)
+
+
 def test_a_model_is_described_by_its_labels_and_topics(data, capsys) -> None:
     assert main(['info', str(data / 'all')]) == 0
     said = capsys.readouterr().out

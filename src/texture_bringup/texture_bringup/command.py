@@ -93,10 +93,10 @@ def _dispatch(given: Sequence[str]) -> int:
     try:
         with task(f'starting {name}'):
             module = cast(Command, command.load())
+            parser = argparse.ArgumentParser(prog=f'texture {name}', description=summary(command))
+            module.configure(parser)
     except KeyboardInterrupt:
         raise KeyboardInterrupt('nothing was requested') from None
-    parser = argparse.ArgumentParser(prog=f'texture {name}', description=summary(command))
-    module.configure(parser)
     return module.run(parser.parse_args(rest))
 
 
