@@ -4,16 +4,16 @@
 
 import shutil
 from contextlib import contextmanager
-from pathlib import Path
+from unittest.mock import MagicMock, Mock
 
 import pytest
 
+from texture_bringup.command import main
 from texture_bringup.commands import explore
 from texture_bringup.operator import ExplorationResult
-from texture_core.errors import CollectionError, ExplorationError, InvalidData, InvalidParameter
+from texture_core.errors import CollectionError, ExplorationError, InvalidData, InvalidParameter, LaunchFailed
 from texture_core.types import RoughnessEstimate, TextureEstimate
-from texture_evaluation.collection import CollectionParams
-from texture_recordings.bags import BagWriter, read_bag
+from texture_evaluation.collection import CollectionEnd, CollectionParams, PlaceAccuracy
 
 pytestmark = pytest.mark.ros
 EXPLORER = {
@@ -43,18 +43,20 @@ class Explorer:
 
 @pytest.fixture
 def collected(monkeypatch, tmp_path):
-    """Collect with an explorer, by a recorder that makes a bag, and may end."""
+    """Collect with an explorer, by a recorder that makes a bag, and may not start, end or lose samples."""
 
-    def collected(explorer, recorder_ends=False, **params):
+    def collected(explorer, recorder_ends=False, start=None, losses='', **params):
+        recording = Mock()
+        recording.check.side_effect = InvalidData('the recorder ended: no space') if recorder_ends else None
+        recording.wait_for.return_value = losses
+
         @contextmanager
         def recorder(_operator, bag, _namespace):
-            def check():
-                if recorder_ends:
-                    raise InvalidData('the recorder ended: no space')
-
             bag.mkdir()
             (bag / 'cork.mcap').touch()
-            yield check
+            if start:
+                raise start
+            yield recording
 
         monkeypatch.setattr(explore, 'recorder', recorder)
         return explore.collect_surface(explorer, 'cork', tmp_path, CollectionParams(**params))
@@ -89,28 +91,49 @@ def test_a_bag_without_any_slide_is_removed_and_the_sentence_says_so(collected, 
     assert end.message.endswith('; no slide was made, so no bag is kept') != kept
 
 
-def test_touches_begin_when_the_recorder_writes_what_the_nodes_send(two_surfaces: Path, tmp_path: Path) -> None:
-    [recorded, _] = sorted((two_surfaces / 'bags').iterdir())
-    streams = {name: value for name, _, value in read_bag(recorded, explore.RECORDED)}
-    bag = tmp_path / 'cork'
-    assert not explore.records(bag, lambda: None)
-    writer = BagWriter(bag)
-    for name, complete in (('signal', False), ('exploration', True)):
-        writer.write(f'/left/{name}', streams[name], 1)
-        writer.flush()
-        assert explore.records(bag, lambda: None) == complete
-    writer.close()
+DONE = ExplorationError.NONE, 'id'
 
 
-def test_slides_that_reach_the_disk_late_are_waited_for(two_surfaces: Path, tmp_path: Path, monkeypatch) -> None:
-    [recorded, _] = sorted((two_surfaces / 'bags').iterdir())
-    bag, waits = tmp_path / recorded.name, []
+def test_ctrl_c_while_the_recorder_starts_leaves_no_bag(collected, tmp_path):
+    end, bag = collected(Explorer(), start=KeyboardInterrupt())
+    assert (end.error, bag, tmp_path.exists()) == (CollectionError.CANCELLED, None, False)
+    assert end.message == 'stopped; no slide was made, so no bag is kept'
 
-    def sleep(seconds: float) -> None:
-        waits.append(seconds)
-        if len(waits) == 3:
-            shutil.copytree(recorded, bag)
 
-    monkeypatch.setattr(explore.time, 'sleep', sleep)
-    assert explore._evaluate_bag(bag, recorded.name, 4).places == 4
-    assert len(waits) == 3
+def test_a_recorder_that_is_not_discovered_leaves_no_bag(collected, tmp_path):
+    with pytest.raises(LaunchFailed, match='not discovered'):
+        collected(Explorer(), start=LaunchFailed('not discovered'))
+    assert not tmp_path.exists()
+
+
+def test_lost_samples_are_reported_once_and_at_the_end(collected, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(explore, '_evaluate_bag', lambda *_: PlaceAccuracy(2, 0))
+    end, bag = collected(Explorer(DONE, DONE), losses='2970 samples lost', places=2)
+    assert (end.error, end.slides, bag) == (CollectionError.NONE, 2, tmp_path / 'cork')
+    assert end.message.endswith('; 2970 samples lost')
+    assert capsys.readouterr().out.splitlines()[0] == '1 slide: 2970 samples lost'
+
+
+def test_a_slide_counts_when_the_recorder_has_it_on_the_disk(tmp_path, monkeypatch):
+    recording = explore.Recorder(tmp_path / 'bag', '', tmp_path / 'log')
+    recording.log.write_text("[record]: exploration 'a' is on the disk: 9 messages recorded, nothing lost\n")
+    assert recording.wait_for('a') == ''
+    with recording.log.open('a') as log:
+        log.write("[record]: exploration 'a-2' is on the disk: 99 messages recorded, 35 samples lost\n")
+    assert recording.wait_for('a-2') == '35 samples lost'
+    monkeypatch.setattr(explore, 'WRITTEN_S', 0.0)
+    with pytest.raises(InvalidData, match="has not written the slide 'b' within 0 s; check the disk"):
+        recording.wait_for('b')
+
+
+@pytest.mark.parametrize('error', CollectionError)
+def test_who_was_stopped_reads_how_to_continue(error, tmp_path, monkeypatch, capsys):
+    end = CollectionEnd(error, 'so it ended', 1)
+    monkeypatch.setattr(explore, 'Operator', MagicMock())
+    (tmp_path / 'cork').mkdir()
+    monkeypatch.setattr(explore, 'collect_surface', lambda *_: (end, tmp_path / 'cork'))
+    main(['collect', 'cork', str(tmp_path), '--seed', '4'])
+    said = ''.join(capsys.readouterr()).splitlines()[0]
+    kept = f"so it ended; 1 slide in '{tmp_path / 'cork'}'"
+    ends = error in (CollectionError.NONE, CollectionError.BOUND_MISSED)
+    assert said == (kept if ends else f"{kept}; continue at other places with --seed 5, into '{tmp_path / 'cork-2'}'")

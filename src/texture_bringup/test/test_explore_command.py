@@ -3,6 +3,8 @@
 """What `texture explore` prints when an exploration does not come to its end."""
 
 import math
+import subprocess
+import sys
 from types import SimpleNamespace
 from unittest.mock import MagicMock
 
@@ -12,7 +14,7 @@ import pytest
 from texture_bringup.command import main
 from texture_bringup.commands.explore import explored
 from texture_bringup.feed import texture_text
-from texture_bringup.operator import ExplorationResult
+from texture_bringup.operator import ExplorationResult, Operator
 from texture_core.cli import run_program
 from texture_core.errors import ExplorationError, MotionAborted
 from texture_core.types import (
@@ -90,7 +92,7 @@ def test_identify_makes_the_slide_that_distinguishes_textures_until_one_is_decid
     slide = operator.__enter__.return_value.explore_with_features
     slide.return_value = ended, [seen]
     model = SimpleNamespace(name='m', next_touch_model=known, feature_set='kind')
-    monkeypatch.setattr('texture_bringup.commands.explore.load_model', lambda _path: model)
+    monkeypatch.setattr('texture_estimation.model.load_model', lambda _path: model)
     monkeypatch.setattr('texture_bringup.commands.explore.Operator', lambda _namespace: operator)
     assert main(['identify', 'm', '--sure', '0.9']) == 0
     said = capsys.readouterr().out
@@ -113,6 +115,23 @@ def test_an_estimate_that_is_not_known_leads_with_that_and_says_why(rejection, m
     nearest = 'glass, confidence 0.78 after 2.9 s'
     estimate = TextureEstimate(0, 'one', 'glass', rejection, 0.78, evidence_s=2.9, message=message)
     assert texture_text(estimate) == (f'unknown (nearest: {nearest}): {reason}' if reason else nearest)
+
+
+def test_explore_begins_without_the_libraries_of_training_and_of_bags():
+    code = (
+        'import sys, texture_bringup.commands.explore; print(*sorted({"rosbags", "scipy", "sklearn"} & {*sys.modules}))'
+    )
+    assert not subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True).stdout.strip()
+
+
+def test_who_interrupts_before_the_request_reads_that_nothing_was_requested(monkeypatch, capsys):
+    with Operator() as operator:
+        monkeypatch.setattr(operator, '_step', MagicMock(side_effect=KeyboardInterrupt))
+        assert run_program(lambda: operator.wait_for_explorer(1.0)) == 130
+    assert capsys.readouterr().err == 'texture: interrupted; nothing was requested\n'
+    monkeypatch.setattr('importlib.metadata.EntryPoint.load', MagicMock(side_effect=KeyboardInterrupt))
+    assert main(['explore', 'linear_slide']) == 130
+    assert capsys.readouterr().err == 'texture: interrupted; nothing was requested\n'
 
 
 def test_the_help_lists_the_motions(capsys):
@@ -146,7 +165,7 @@ def test_a_check_repeats_the_slide_of_the_reference_unless_it_is_told_otherwise(
         asked.append(request)
         raise MotionAborted('enough seen')
 
-    monkeypatch.setattr('texture_bringup.commands.explore.load_model', lambda _path: MagicMock())
+    monkeypatch.setattr('texture_estimation.model.load_model', lambda _path: MagicMock())
     monkeypatch.setattr('texture_bringup.commands.explore.slide_over_plate', slide)
     write_reference(tmp_path / 'model', {}, stored)
     assert main(['check', str(tmp_path / 'model'), *options]) != 0

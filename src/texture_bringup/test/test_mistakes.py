@@ -12,7 +12,7 @@ import pytest
 pytestmark = pytest.mark.ros  # some sub-commands are nodes
 
 from texture_bringup.command import main
-from texture_core.types import ExplorationState, TactileSignal
+from texture_core.types import ExplorationState, FingerReceiver, TactileSignal
 from texture_recordings.bags import BagWriter, read_bag
 from texture_simulation.offline import SlidePlan, write_simulated
 
@@ -55,6 +55,12 @@ def data(tmp_path_factory):
     return folder
 
 
+@pytest.fixture(autouse=True)
+def quiet(monkeypatch):
+    """Show no progress, however busy this machine is."""
+    monkeypatch.setattr('texture_core.cli.QUIET_S', 600.0)
+
+
 def test_a_model_is_described_by_its_labels_and_topics(data, capsys) -> None:
     assert main(['info', str(data / 'all')]) == 0
     said = capsys.readouterr().out
@@ -68,6 +74,14 @@ def refused(arguments, capsys) -> str:
     said = capsys.readouterr().err
     assert said.count('\n') == 1, said
     return said
+
+
+def test_a_second_emulator_is_refused_before_a_bag_is_made(capsys, tmp_path) -> None:
+    running = FingerReceiver(str(tmp_path / 'finger'))
+    launch = ['launch', 'emulator', f'devices:={tmp_path}', 'record:=true', f'bag:={tmp_path / "bag"}']
+    assert 'another emulator uses the pipe' in refused(launch, capsys)
+    assert not (tmp_path / 'bag').exists()
+    running.close()
 
 
 def test_the_models_are_good_and_the_figures_are_written(data, capsys, tmp_path) -> None:
@@ -109,6 +123,8 @@ def test_the_models_are_good_and_the_figures_are_written(data, capsys, tmp_path)
         ('explore --preset jamali --repeats -1', '--repeats is -1'),
         ('explore', 'give the motion, such as linear_slide, or --preset NAME'),
         ('collect cork out --force 6 3', "'force_low_n' is 6; it must not be above 'force_high_n', 3"),
+        ('collect cork fast.npz', "'fast.npz' cannot be the folder of the bags: it is a file; name another"),
+        ('collect cork /proc/none', "'/proc/none' cannot be the folder of the bags: No such file or directory"),
         ('identify fast --most 0', '--most is 0'),
         ('identify /nowhere', "there is no model '/nowhere'"),
         ('identify /nowhere.npz', "there is no model '/nowhere.npz'"),

@@ -3,12 +3,16 @@
 """What is seen of a recording and of this machine on a terminal, and how an exploration ends for a script."""
 
 import json
+from io import StringIO
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from texture_bringup.command import main
 from texture_bringup.commands.explore import as_json, exit_code
+from texture_bringup.commands.watch import picture
+from texture_bringup.feed import Feed
 from texture_bringup.operator import ExplorationResult
 from texture_core.errors import ExplorationError
 from texture_core.types import (
@@ -50,6 +54,17 @@ def test_a_recording_is_shown_as_a_line_for_each_change_without_a_terminal(bag, 
     assert '0.050 m/s  1.00 N' in slide
     assert 'unknown (nearest: cork, confidence 0.61 after 0.6 s): it resembles no trained texture' in slide
     assert lines[-1].startswith('done')
+
+
+def test_what_the_estimate_says_is_not_repeated_for_the_classifier():
+    feed = Feed()
+    for name, message in (('classifier', 'no model is loaded; give one'), ('sensor', 'no sample for 2 s')):
+        feed.node_statuses.update(name, 'WARN', message, 0.0)
+    console = Console(file=StringIO(), width=200)
+    console.print(picture(feed.frame(0.0), 1.0))
+    said = console.file.getvalue()
+    assert said.count('no model is loaded') == 1
+    assert 'sensor: no sample for 2 s' in said
 
 
 def test_a_bag_is_described_by_its_messages_and_slides(bag, capsys):

@@ -186,20 +186,11 @@ class Operator:
     def wait_for_explorer(self, deadline_s: float, quiet_s: float | None = None) -> None:
         """Wait until explorations can be requested; the wait is shown after `quiet_s`."""
         advice = 'start one, such as the emulator with `texture launch emulator`'
-        ours = self._node.get_namespace()
-        try:
-            with task(f"waiting for an explorer in the namespace '{ours}'; {advice}", quiet_s=quiet_s):
-                self.wait_until(self._explore.server_is_ready, deadline_s, f'no explorer answers; {advice}')
-        except LaunchFailed as error:
-            others = {space for name, space in self._node.get_node_names_and_namespaces() if name == 'explorer'} - {
-                ours
-            }
-            if not others:
-                raise
-            raise LaunchFailed(
-                f"no explorer answers in the namespace '{ours}' (waited {deadline_s:.0f} s); there are explorers in "
-                f'{", ".join(sorted(others))}: give one as --namespace'
-            ) from error
+        with task(f'waiting for an explorer; {advice}', quiet_s=quiet_s):
+            try:
+                self._until(self._explore.server_is_ready, deadline_s, f'no explorer answers; {advice}')
+            except KeyboardInterrupt:
+                raise KeyboardInterrupt('nothing was requested') from None
 
     def wait_for_node(self, name: str, deadline_s: float) -> None:
         """Wait until a node of the namespace is there."""
@@ -218,14 +209,16 @@ class Operator:
         finally:
             self._node.destroy_subscription(subscription)
 
-    def wait_for_listeners(self, topics: Sequence[str], number: int, guard: Callable[[], None]) -> None:
+    def wait_for_listeners(
+        self, topics: Sequence[str], number: int, guard: Callable[[], None], who: str = 'a node'
+    ) -> None:
         """Wait until topics have `number` subscriptions and these are discovered; `guard` is called meanwhile."""
 
         def all_listen() -> bool:
             guard()
             return all(self._node.count_subscribers(topic) >= number for topic in topics)
 
-        self.wait_until(all_listen, LISTENERS_DEADLINE_S, f'no node subscribes to {", ".join(topics)}')
+        self._until(all_listen, LISTENERS_DEADLINE_S, f'{who} has not subscribed to {", ".join(topics)} yet')
         self._settle()
 
     def explore(

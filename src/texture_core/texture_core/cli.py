@@ -219,6 +219,6 @@ def run_program(action: Callable[[], int], name: str = 'texture') -> int:
             raise
         print(f"{name}: '{error.filename}' cannot be used: {error.strerror}; give another path", file=sys.stderr)
         return USER_ERROR
-    except KeyboardInterrupt:
-        print(f'{name}: interrupted', file=sys.stderr)
+    except KeyboardInterrupt as interrupt:
+        print(f'{name}: interrupted{f"; {interrupt}" * bool(str(interrupt))}', file=sys.stderr)
         return INTERRUPTED

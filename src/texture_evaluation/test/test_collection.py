@@ -153,10 +153,25 @@ def test_neighbours_of_a_left_out_place_are_left_out_too():
     assert evaluate_places(features(lambda place: 0.0, n_places=2), 'oak').places == 2
 
 
-@pytest.mark.parametrize(('bands', 'spacing_m'), [((5, 5, 1), 0.08), ((5, 1, 5), 0.04), ((1, 5, 5), 0.0), ((), 0.0)])
-def test_the_spacing_of_tracks_is_twice_the_farthest_good_band(bands, spacing_m):
-    counted = tuple(Band(far_m, 5, correct, 0) for far_m, correct in zip(BANDS_M, bands, strict=False))
-    assert PlaceAccuracy(5, 5, '', 1, counted).spacing_m == pytest.approx(spacing_m)
+@pytest.mark.parametrize(
+    ('bands', 'spacing_m'),  # of each band: places, correct ones, accepted and correct ones
+    [
+        (((6, 6, 5), (6, 6, 6), (6, 1, 0)), 0.08),
+        (((6, 6, 5), (6, 1, 0), (6, 6, 6)), 0.04),
+        (((6, 1, 0), (6, 6, 6), (6, 6, 6)), 0.0),
+        (((2, 2, 0), (6, 6, 5)), 0.08),
+        (((6, 6, 5), (2, 2, 2)), 0.04),  # too few to say more
+        (((2, 2, 0),), 0.0),
+        (((9, 9, 4),), 0.0),
+        ((), 0.0),
+    ],
+)
+def test_the_spacing_of_tracks_is_twice_the_farthest_good_band_with_five_accepted_places(bands, spacing_m):
+    counted = tuple(Band(far_m, *counts) for far_m, counts in zip(BANDS_M, bands, strict=False))
+    found = PlaceAccuracy(6, 6, '', 1, counted)
+    assert found.spacing_m == pytest.approx(spacing_m)
+    if bands and not spacing_m:
+        assert 'spacing of tracks: unknown: at one distance 5 accepted places are needed' in found.sentence
 
 
 DONE = (ExplorationError.NONE, '')

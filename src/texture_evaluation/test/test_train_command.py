@@ -61,9 +61,14 @@ def test_a_surface_with_far_fewer_slides_than_others_is_named(model: TextureMode
     assert [line.partition(';')[0] for line in found] == ([expected] if expected else [])
 
 
-def test_a_training_with_one_slide_of_a_label_is_reported_as_too_confident(simulated: Path) -> None:
-    lines = summary(train_from_bags('default', [simulated], '1'), Path('model.npz'))
-    assert lines[2] == 'this accuracy is of held-out windows, as a label has a single slide: too confident'
+@pytest.mark.parametrize(('fewest', 'shown'), [(4, False), (5, True)])
+def test_an_accuracy_is_shown_from_five_slides_of_each_surface_on(
+    model: TextureModel, fewest: int, shown: bool
+) -> None:
+    domain = replace(model.acceptance.domain, slides={'cork': 75, 'felt': fewest})
+    lines = summary(replace(model, acceptance=replace(model.acceptance, domain=domain)), Path('model.npz'))
+    assert lines[1].endswith('; for an accuracy 5 slides of each surface are needed') != shown
+    assert bool(re.search(r'\d % accuracy of held-out windows', '\n'.join(lines))) == shown
 
 
 def test_the_training_reports_nothing_where_they_are_enough(model: TextureModel) -> None:

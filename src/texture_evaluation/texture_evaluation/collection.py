@@ -18,6 +18,7 @@ from scipy.stats import beta
 from texture_core.config import param
 from texture_core.errors import CollectionError, ExplorationError, InvalidData, InvalidParameter, TextureError
 from texture_core.types import Array, ExplorationRequest, checked_label
+from texture_estimation.acceptance import LEAST_SLIDES_A_LABEL
 from texture_estimation.learners.discriminant import Discriminant
 from texture_estimation.recipe import load_recipe
 from texture_estimation.training import train
@@ -221,8 +222,8 @@ class PlaceAccuracy:
     @property
     def spacing_m(self) -> float:
         """Largest spacing of tracks: the farthest point between two is half of it from either; 0 if unknown."""
-        near = list(takewhile(lambda band: band.correct >= ENOUGH * band.places, self.bands))
-        return 2.0 * near[-1].far_m if near else 0.0
+        near = takewhile(lambda band: band.correct >= ENOUGH * band.places, self.bands)
+        return max((2.0 * band.far_m for band in near if band.accepted >= LEAST_SLIDES_A_LABEL), default=0.0)
 
     @property
     def sentence(self) -> str:
@@ -240,7 +241,11 @@ class PlaceAccuracy:
             f'{100 * band.far_m:.0f} cm {band.correct} of {band.places} ({band.accepted} accepted)'
             for band in self.bands
         )
-        spacing = f'up to {100 * self.spacing_m:.0f} cm' if self.spacing_m else 'smaller than these distances'
+        unknown = (
+            f'unknown: at one distance {LEAST_SLIDES_A_LABEL} accepted places are needed, and up to it '
+            f'{100 * ENOUGH:.0f} % correct ones'
+        )
+        spacing = f'up to {100 * self.spacing_m:.0f} cm' if self.spacing_m else unknown
         return f'{found}; by distance to the nearest trained place: {by_distance}; spacing of tracks: {spacing}'
 
 

@@ -27,6 +27,7 @@ from texture_core.types import (
 from texture_recordings.bags import (
     TYPES,
     BagWriter,
+    RawMessage,
     decode,
     encode,
     find_bags,
@@ -172,10 +173,13 @@ def test_a_missing_bag_a_foreign_folder_and_a_foreign_file_are_refused_with_a_se
             list(read_bag(foreign))
 
 
-def test_a_bag_without_messages_of_the_suite_is_refused(tmp_path: Path) -> None:
-    with BagWriter(tmp_path / 'bag'):
+def test_a_bag_with_other_messages_is_refused_and_an_empty_one_yields_nothing(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / 'empty'):
         pass
-    with pytest.raises(InvalidData, match='holds nothing'):
+    assert list(read_bag(tmp_path / 'empty')) == []
+    with BagWriter(tmp_path / 'bag') as bag:
+        bag.write_raw(RawMessage('/said', 'std_msgs/msg/String', 1, b'\0\1\0\0\1\0\0\0\0'))
+    with pytest.raises(InvalidData, match='holds std_msgs/msg/String; messages of texture_msgs are needed'):
         list(read_bag(tmp_path / 'bag'))
 
 

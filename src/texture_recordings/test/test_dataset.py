@@ -75,15 +75,14 @@ def test_unlabelled_slides_are_left_out_and_a_bag_without_labels_is_refused(tmp_
         find_slides([write(tmp_path / 'none', ['', ''], start_s=0)])
 
 
-@pytest.mark.parametrize('surfaces', [[], ['cork', 'felt']])
-def test_bags_of_explorations_that_were_refused_or_aborted_before_their_slide_are_named_so(
-    tmp_path: Path, surfaces: list[str]
-) -> None:
-    bag = write(tmp_path / 'aborted', surfaces, start_s=0, phases=(Phase.APPROACH, Phase.ABORTED))
-    with BagWriter(bag.with_name('idle')) as idle:
-        idle.write('exploration', ExplorationState(1, '', '', Phase.IDLE), 1)
-    with pytest.raises(InvalidData, match=r"came to its slide: .* ends with 'the motion was completed'"):
-        find_slides([bag.with_name('idle'), *([bag] if surfaces else [])])
+def test_an_empty_bag_among_others_is_named_and_skipped(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    write(tmp_path / 'cork', ['cork'], start_s=0)
+    with BagWriter(tmp_path / 'cork-2'):
+        pass
+    assert [slide.bag.name for slide in find_slides([tmp_path])] == ['cork']
+    assert f"the bag '{tmp_path / 'cork-2'}' has no labelled slide" in caplog.text
+    with pytest.raises(InvalidData, match='is labelled'):
+        find_slides([tmp_path / 'cork-2'])
 
 
 def test_slides_that_no_surface_has_are_refused(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Both nodes as real processes: what is replayed into the graph and recorded from it is what was in the bag."""
 
+import re
 import signal
 import time
 from pathlib import Path
@@ -64,6 +65,10 @@ def test_what_is_replayed_is_recorded_whole_and_in_order(tmp_path: Path) -> None
         assert record.stop(signal.SIGTERM) == 0, record.output
     assert 'published 200 exploration, 200 signal' in replay.output
     assert '5 samples lost' in record.output
+    # The first one is over when the second begins, and nothing tells that the second is.
+    assert re.findall(r"exploration '(\w+)' is on the disk: \d+ messages recorded, (.*)", record.output) == [
+        ('slide0', 'nothing lost')
+    ]
     for topic in ('signal', 'exploration'):
         sent = [value for _, _, value in read_bag(source, (topic,))]
         got = [value for _, _, value in read_bag(tmp_path / 'copy', (topic,))]

@@ -341,9 +341,11 @@ def short_name(topic: str) -> str:
 
 def connections_below(path: Path, connections: list[Connection], namespace: str | None) -> list[Connection]:
     """Return the connections of the suite's messages in a namespace, and those of the diagnostics."""
+    if not connections:
+        return []
     ours = [c for c in connections if c.msgtype in MESSAGES]
     if not ours:
-        named = ', '.join(sorted({c.msgtype for c in connections})) or 'nothing'
+        named = ', '.join(sorted({c.msgtype for c in connections}))
         raise InvalidData(
             f"the bag '{path}' holds {named}; messages of texture_msgs are needed, record the suite's topics"
         )

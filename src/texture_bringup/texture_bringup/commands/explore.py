@@ -9,6 +9,7 @@ import json
 import logging
 import math
 import os
+import re
 import shutil
 import sys
 import tempfile
@@ -18,34 +19,33 @@ from contextlib import contextmanager, suppress
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from texture_bringup.feed import roughness_text, texture_text
 from texture_bringup.launcher import Child
 from texture_bringup.operator import ExplorationResult, Operator, Progress
-from texture_core.cli import USER_ERROR, Command, add_namespace, add_parameters, parameters_from
+from texture_core.cli import USER_ERROR, Command, add_namespace, add_parameters, parameters_from, task
 from texture_core.config import find
 from texture_core.errors import (
     CollectionError,
     ExplorationError,
     InvalidData,
     InvalidParameter,
+    LaunchFailed,
     MotionAborted,
     MotionRefused,
 )
 from texture_core.types import ExplorationRequest, ExplorationState, TextureEstimate
-from texture_estimation.model import load_model
-from texture_estimation.next_motion import slide_values
-from texture_evaluation import collection
-from texture_evaluation.check import adapt_to_today, check_finger, store_reference
 from texture_exploration.motions import MOTIONS
 from texture_exploration.presets import load_preset
-from texture_features.correction import read_reference
-from texture_features.feature_set import FeatureSet
-from texture_recordings.bags import topics_in
-from texture_recordings.dataset import SlideDataset
+
+if TYPE_CHECKING:
+    from texture_evaluation import collection
+
+# What evaluates is imported when it runs: `explore` has to begin at once.
+# ruff: noqa: PLC0415
 
 T = TypeVar('T')
 # Option, field of the request, unit, meaning.
@@ -168,7 +168,7 @@ def explored(explore: Callable[[ExplorationRequest, Progress], T], request: Expl
                 print(file=sys.stderr)
     except KeyboardInterrupt as interrupt:
         print(interrupt, file=sys.stderr)
-        raise
+        raise KeyboardInterrupt from None
 
 
 def print_result(result: ExplorationResult) -> bool:
@@ -234,6 +234,9 @@ def _identify(options: argparse.Namespace) -> int:
         raise InvalidParameter(
             f'--most is {options.most} and --sure {options.sure:g}; 1 or more and a probability are needed'
         )
+    from texture_estimation.model import load_model
+    from texture_estimation.next_motion import slide_values
+
     model = load_model(options.model)
     known = model.next_touch_model
     if known is None:
@@ -274,12 +277,13 @@ def _identify(options: argparse.Namespace) -> int:
 # Collect slides of a surface.
 
 RECIPE = 'default'  # whose features distinguish the places
-FLUSHED_S = 20.0  # within which what was recorded can be read: a recorder may be behind
+WRITTEN_S = 60.0  # within which a slide is on the disk: the recorder may be behind
 RECORDED = ('signal', 'exploration')
 RECORDER_S = 60.0  # to start, on a busy machine
 PATCH = ('patch_x_low_m', 'patch_x_high_m', 'patch_y_low_m', 'patch_y_high_m')
 LEAST_SPEED_M_S = 0.002  # of every explorer
 LIMITS = ('min_force_n', 'max_force_n', 'max_speed_m_s')
+POLL_S = 0.1
 BAGS_LOG = logging.getLogger('texture_recordings.bags')
 
 
@@ -290,6 +294,8 @@ def collect_surface(
 
     A bag without any slide is removed; then None is returned instead.
     """
+    from texture_evaluation import collection
+
     low_x, high_x, low_y, high_y, low_n, high_n, high_m_s = operator.parameters('explorer', (*PATCH, *LIMITS))
     if not (low_x < high_x and low_y < high_y):
         raise InvalidData(
@@ -300,76 +306,100 @@ def collect_surface(
     plan = collection.PlacePlan(surface, params, patch, (low_n, high_n), (LEAST_SPEED_M_S, high_m_s))
     folder.mkdir(parents=True, exist_ok=True)
     bag = folder / collection.next_bag([one.name for one in folder.iterdir()], surface)
-    with recorder(operator, bag, namespace) as check:
+    made, losses = 0, ''
+    end = collection.CollectionEnd(CollectionError.CANCELLED, 'stopped', 0)  # by Ctrl-C while the recorder starts
+    try:
+        with suppress(KeyboardInterrupt), recorder(operator, bag, namespace) as recording:
 
-        def explore(request: ExplorationRequest) -> tuple[ExplorationError, str]:
-            check()
-            try:
-                explored = operator.explore(request)
-            except (MotionRefused, MotionAborted) as error:
-                return error.error, str(error)
-            return explored.error, explored.message
+            def explore(request: ExplorationRequest) -> tuple[ExplorationError, str]:
+                nonlocal made, losses
+                recording.check()
+                try:
+                    explored = operator.explore(request)
+                except (MotionRefused, MotionAborted) as error:
+                    return error.error, str(error)
+                if explored.success:
+                    made += 1
+                    if (lost := recording.wait_for(explored.exploration_id)) != losses:
+                        losses = lost
+                        _print_progress(losses, made)
+                return explored.error, explored.message
 
-        end = collection.collect(plan, params, explore, partial(_evaluate_bag, bag, surface), _print_progress)
+            end = collection.collect(plan, params, explore, partial(_evaluate_bag, bag, surface), _print_progress)
+    except LaunchFailed:  # the recorder was not discovered
+        _remove(bag)
+        raise
+    end = replace(end, message=f'{end.message}; {losses}' if losses else end.message, slides=made)
     # Where the recorder has ended, the bag there may be another one.
-    if end.slides or end.error is CollectionError.NOT_RECORDED:
+    if made or end.error is CollectionError.NOT_RECORDED:
         return end, bag
-    shutil.rmtree(bag, ignore_errors=True)
-    with suppress(OSError):  # other surfaces are in it
-        folder.rmdir()
+    _remove(bag)
     return replace(end, message=f'{end.message}; no slide was made, so no bag is kept'), None
 
 
+def _remove(bag: Path) -> None:
+    """Remove a bag, and its folder if no other surface is in it."""
+    shutil.rmtree(bag, ignore_errors=True)
+    with suppress(OSError):
+        bag.parent.rmdir()
+
+
 def _print_progress(sentence: str, slides: int) -> None:
-    print(f'{slides} slides: {sentence}', flush=True)
+    print(f'{slides} slide{"s" * (slides != 1)}: {sentence}', flush=True)
 
 
-def _evaluate_bag(bag: Path, surface: str, slides: int) -> collection.PlaceAccuracy:
-    """Evaluate all bags of the folder, once the newest one has `slides` slides on the disk."""
+def _evaluate_bag(bag: Path, surface: str, _slides: int) -> collection.PlaceAccuracy:
+    """Evaluate all bags of the folder of a bag."""
+    from texture_evaluation.collection import evaluate_places
+    from texture_features.feature_set import FeatureSet
+    from texture_recordings.dataset import SlideDataset
+
     feature_set = FeatureSet.load(RECIPE)
-    deadline_s = time.monotonic() + FLUSHED_S
-    while True:
-        time.sleep(1.0)
-        late = time.monotonic() > deadline_s
-        try:
-            with unfinished_bags():
-                dataset = SlideDataset.from_bags([bag.parent], topics=feature_set.topics)
-        except InvalidData:  # nothing of the first slides is there yet
-            if late:
-                raise
-            continue
-        written = sum(one.bag == bag for one in dataset)
-        if written >= slides or late:
-            return collection.evaluate_places(dataset.features(feature_set), surface)
-
-
-@contextmanager
-def unfinished_bags() -> Iterator[None]:
-    """Read bags that are still recorded, without the warning that they have no end."""
-    BAGS_LOG.disabled = True
+    BAGS_LOG.disabled = True  # the bag that is still recorded has no end yet
     try:
-        yield
+        dataset = SlideDataset.from_bags([bag.parent], topics=feature_set.topics)
     finally:
         BAGS_LOG.disabled = False
+    return evaluate_places(dataset.features(feature_set), surface)
+
+
+class Recorder(Child):
+    """Record a bag in a separate process, which reports in its log what is on the disk."""
+
+    def __init__(self, bag: Path, namespace: str, log: Path) -> None:
+        super().__init__(['record', str(bag), '--namespace', namespace], os.environ, log)
+
+    def check(self) -> None:
+        """Raise InvalidData, with its last message, if it has ended."""
+        if self.end:
+            raise InvalidData(f'the recorder ended: {self.end}')
+
+    def wait_for(self, exploration_id: str) -> str:
+        """Return what was lost so far, '' if nothing, once an exploration is on the disk; InvalidData if it is not."""
+        report = re.compile(rf"'{re.escape(exploration_id)}' is on the disk: \d+ messages recorded, (.*)")
+        deadline_s = time.monotonic() + WRITTEN_S
+        with task('waiting until the slide is on the disk'):
+            while not (found := report.search(self.log.read_text(errors='replace'))):
+                self.check()
+                if time.monotonic() > deadline_s:
+                    raise InvalidData(
+                        f"the recorder has not written the slide '{exploration_id}' within {WRITTEN_S:g} s; check the "
+                        'disk, or reduce the load of the computer'
+                    )
+                time.sleep(POLL_S)
+        return found[1].replace('nothing lost', '')
 
 
 @contextmanager
-def recorder(operator: Operator, bag: Path, namespace: str) -> Iterator[Callable[[], None]]:
-    """Record a bag in a separate process, once it writes what the nodes send.
-
-    The function raises InvalidData, with the last message of the recorder, if that ended.
-    """
-    arguments = ['record', str(bag), '--namespace', namespace]
-    with tempfile.TemporaryDirectory() as log, Child(arguments, os.environ, Path(log) / 'record.log') as child:
-
-        def check() -> None:
-            if child.end:
-                raise InvalidData(f'the recorder ended: {child.end}')
-
-        operator.wait_until(
-            lambda: records(bag, check), RECORDER_S, f'{" and ".join(RECORDED)} do not reach the recorder'
-        )
-        yield check
+def recorder(operator: Operator, bag: Path, namespace: str) -> Iterator[Recorder]:
+    """Record a bag, from when all that is to be recorded has been discovered."""
+    # By then all other nodes are discovered.
+    operator.wait_for_listeners(RECORDED, 1, lambda: None, 'the feature extractor')
+    wanted = {topic: operator.listeners(topic) + 1 for topic in RECORDED}
+    with tempfile.TemporaryDirectory() as log, Recorder(bag, namespace, Path(log) / 'record.log') as recording:
+        for topic, number in wanted.items():
+            operator.wait_for_listeners((topic,), number, recording.check, 'the recorder that starts')
+        yield recording
 
 
 def records(bag: Path, check: Callable[[], None]) -> bool:
@@ -385,13 +415,15 @@ SHORTER = ('distance_m', 'speed_low_m_s', 'speed_high_m_s', 'force_low_n', 'forc
 
 
 def _configure_collect(parser: argparse.ArgumentParser) -> None:
+    from texture_evaluation.collection import CollectionParams
+
     parser.add_argument('surface', help='label of the surface under the finger')
     parser.add_argument('folder', type=Path, help='folder of the bags of all surfaces; made if missing')
     shape: dict[str, Any] = {'type': float, 'nargs': 2, 'default': (0.0, 0.0), 'metavar': ('LOW', 'HIGH')}
     speed, force = 'speeds of the slides, m/s (default: 0.02 to 0.05)', 'normal forces, N (default: 1 to 2)'
     parser.add_argument('--speed', help=f'{speed}, as far as the explorer allows', **shape)
     parser.add_argument('--force', help=f'{force}, or the lowest that the explorer allows to twice that', **shape)
-    add_parameters(parser, collection.CollectionParams, without=SHORTER)
+    add_parameters(parser, CollectionParams, without=SHORTER)
     parser.add_argument(
         '--distance', type=float, default=0.04, metavar='M', help='length of each slide (default: 0.04)'
     )
@@ -400,12 +432,26 @@ def _configure_collect(parser: argparse.ArgumentParser) -> None:
 
 def _collect(options: argparse.Namespace) -> int:
     """Collect, and report how well left-out places are recognised; return 0 if the bound is met, else 1."""
+    from texture_evaluation.collection import CollectionParams, next_bag
+
     given = dict(zip(SHORTER, (options.distance, *options.speed, *options.force), strict=True))
-    params = parameters_from(options, collection.CollectionParams, given)
-    with Operator(options.namespace) as operator:
-        operator.wait_for_explorer(EXPLORER_S, SOON_S)
-        end, bag = collect_surface(operator, options.surface, options.folder, params, options.namespace)
-    kept = f"; {end.slides} slides in '{bag}'" if bag else ''
+    params, folder = parameters_from(options, CollectionParams, given), options.folder
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = 'it is a file' if folder.is_file() else error.strerror
+        raise InvalidParameter(f"'{folder}' cannot be the folder of the bags: {reason}; name another") from error
+    try:
+        with Operator(options.namespace) as operator:
+            operator.wait_for_explorer(EXPLORER_S, SOON_S)
+            end, bag = collect_surface(operator, options.surface, folder, params, options.namespace)
+    finally:
+        with suppress(OSError):  # bags are in it
+            folder.rmdir()
+    kept = f"; {end.slides} slide{'s' * (end.slides != 1)} in '{bag}'" if bag else ''
+    if end.error not in (CollectionError.NONE, CollectionError.BOUND_MISSED):
+        following = folder / next_bag([one.name for one in folder.glob('*')], options.surface)
+        kept += f"; continue at other places with --seed {params.seed + 1}, into '{following}'"
     print(f'{end.message}{kept}', file=sys.stderr if end.error else sys.stdout)
     if end.error is CollectionError.CANCELLED:
         raise KeyboardInterrupt
@@ -445,6 +491,11 @@ def _configure_check(parser: argparse.ArgumentParser) -> None:
 
 def _check(options: argparse.Namespace) -> int:
     """Check, store or adapt; return 1 if the finger is not as trained and was not corrected."""
+    from texture_estimation.model import load_model
+    from texture_evaluation.check import adapt_to_today, check_finger, store_reference
+    from texture_features.correction import read_reference
+    from texture_recordings.dataset import SlideDataset
+
     if options.today or options.trained:
         if not (options.today and options.trained):
             raise InvalidParameter('--today and --trained need each other: slides of today, and those of the training')

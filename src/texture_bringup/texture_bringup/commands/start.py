@@ -62,7 +62,7 @@ def _look_at(module: str, load: str, value: str, *surfaces: str) -> None:
 
 
 def refuse_wrong(nodes: Sequence[NodeDescription], given: set[str]) -> None:
-    """Raise, before any node starts, the error of a node of the suite for a value that was given.
+    """Raise, before any node starts, the error of a node of the suite for a value that was given, or its pipe.
 
     In a separate process: a launcher that stays needs none of their libraries.
     """
@@ -71,6 +71,8 @@ def refuse_wrong(nodes: Sequence[NodeDescription], given: set[str]) -> None:
         module, load, *names = LOOKED_AT.get(node.executable, ('', ''))
         known = {name: value for one in node.parameters if isinstance(one, Mapping) for name, value in one.items()}
         values = [str(known.get(name, '')) for name in names]
+        if node.executable == 'emulator':  # only one can use the pipe; else a recorder would have made its bag
+            wanted.append(('texture_core.types', 'FingerReceiver', str(known['finger_pipe'])))
         if all(values) and given.intersection(values):
             wanted.append((module, load, *values))
     if wanted:

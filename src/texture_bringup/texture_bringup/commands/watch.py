@@ -98,7 +98,8 @@ def picture(frame: Frame, peak: float) -> Group:
     style = 'green' if texture['accepted'] else 'yellow'
     for label, probability in list(zip(texture['labels'], texture['probabilities'], strict=True))[:LABELS]:
         rows.add_row(label, bar(probability, style), f'{probability:.2f}')
-    faults = [light for light in frame['lights'] if light['colour'] not in ('green', 'grey')]
+    lights = (light for light in frame['lights'] if light['colour'] not in ('green', 'grey'))
+    faults = [light for light in lights if light['message'] not in texture['text']]
     return Group(
         rows,
         Text(f'texture    {texture["text"]}', style=f'bold {style}'),

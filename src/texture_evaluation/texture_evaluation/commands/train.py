@@ -11,6 +11,7 @@ from pathlib import Path
 from texture_core.cli import add_slides
 from texture_core.config import shipped
 from texture_core.errors import InvalidParameter
+from texture_estimation.acceptance import LEAST_SLIDES_A_LABEL
 from texture_estimation.model import TextureModel
 from texture_estimation.roughness import RoughnessModel
 from texture_evaluation.train import train_from_bags, train_grades_from_bags
@@ -62,15 +63,16 @@ def _check_place(out: Path, *, replace: bool) -> None:
 def summary(model: TextureModel, out: Path) -> list[str]:
     """Return the labels of a model and its held-out accuracy, in lines."""
     training = model.training
-    accuracy = training['held_out_window_accuracy']
+    accuracy, slides = training['held_out_window_accuracy'], model.acceptance.domain.slides
     held_out = 'nothing was held out' if accuracy is None else f'{100 * accuracy:.1f} % accuracy of held-out windows'
+    if accuracy is not None and min(slides.values(), default=0) < LEAST_SLIDES_A_LABEL:
+        held_out = f'for an accuracy {LEAST_SLIDES_A_LABEL} slides of each surface are needed'
     kinds = len(model.next_touch_model.motions) if model.next_touch_model else 0
     return [
         f"recipe '{model.recipe.name}' trained on {len(model.labels)} surfaces: {', '.join(model.labels)}",
         f'from {training["slides"]} slides, {training["windows"]} windows of {training["window_s"]:g} s; {held_out}',
-        *(f'this accuracy is of {note}' for note in [training['calibration']] if note.endswith('too confident')),
         *_unfit(model),
-        *_uneven(model.acceptance.domain.slides),
+        *_uneven(slides),
         *training.get('tare', []),
         *filter(
             None, [model.acceptance.reason or model.acceptance.decided_reason, model.acceptance.domain.reach_reason]

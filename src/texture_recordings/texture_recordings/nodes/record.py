@@ -18,7 +18,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from texture_core.config import param
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.ros import DiagnosticReport, Diagnostics, declare, run
-from texture_core.types import Quality
+from texture_core.types import ENDED, Quality, TactileSignal
 from texture_recordings.bags import COMMON, MESSAGES, BagWriter, Continuity, RawMessage, decode, typestore
 from texture_recordings.ros import TOPICS, message_class
 
@@ -54,6 +54,7 @@ class RecordNode(Node):
         self._bag = BagWriter(params.out)
         self._counts: Counter[str] = Counter()
         self._continuity = Continuity()
+        self._exploring: dict[str, str] = {}  # id of the exploration that is recorded, '' if none, by topic
         self._queue: queue.Queue[RawMessage | None] = queue.Queue(QUEUE)
         self._error: OSError | None = None
         self._writer = threading.Thread(target=self._write, name='writer')
@@ -122,15 +123,13 @@ class RecordNode(Node):
             try:
                 if message is not NOTHING:
                     self._bag.write_raw(message)
+                    self._counts['messages'] += 1
+                    self._note(message)
                 if time.monotonic() - flushed_s >= FLUSH_S:
                     flushed_s = time.monotonic()
                     self._bag.flush()
-            except OSError as error:
+            except OSError as error:  # noqa: PERF203 - what comes later may fit
                 self._error = self._error or error
-                continue
-            if message is not NOTHING:
-                self._counts['messages'] += 1
-                self._count_losses(message)
 
     def _next(self) -> RawMessage | None:
         try:
@@ -138,15 +137,23 @@ class RecordNode(Node):
         except queue.Empty:
             return NOTHING
 
-    def _count_losses(self, message: RawMessage) -> None:
-        if not message.msgtype.endswith('/TactileSignal'):
+    def _note(self, message: RawMessage) -> None:
+        """Count lost samples, and bring an exploration that is over to the disk."""
+        if not message.msgtype.endswith(('/TactileSignal', '/ExplorationState')):
             return
         try:
-            signal = decode(message.data, message.msgtype)
+            value = decode(message.data, message.msgtype)
         except InvalidData:
             self._counts['bad'] += 1
             return
-        self._continuity.update(message.topic, signal)
+        if isinstance(value, TactileSignal):
+            self._continuity.update(message.topic, value)
+            return
+        before = self._exploring.get(message.topic, '')
+        self._exploring[message.topic] = '' if value.phase in ENDED else value.exploration_id
+        if before and before != self._exploring[message.topic]:
+            self._bag.flush()
+            self.get_logger().info(f"exploration '{before}' is on the disk: {self._report()[1]}")
 
     def _check(self) -> None:
         if self._error is not None:
