@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a collection asks of the explorer, and which bag it leaves, without a robot."""
 
-import shutil
 from contextlib import contextmanager
 from unittest.mock import MagicMock, Mock
 

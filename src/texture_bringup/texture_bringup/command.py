@@ -21,7 +21,7 @@ from functools import cache, partial
 from importlib.metadata import EntryPoint, entry_points, version
 from typing import cast
 
-from texture_core.cli import Command, run_program, show_progress, task
+from texture_core.cli import Command, Parser, run_program, show_progress, task
 from texture_core.config import find
 
 GROUP, PACKAGE = 'texture.commands', 'texture_bringup'
@@ -93,7 +93,7 @@ def _dispatch(given: Sequence[str]) -> int:
     try:
         with task(f'starting {name}'):
             module = cast(Command, command.load())
-            parser = argparse.ArgumentParser(prog=f'texture {name}', description=summary(command))
+            parser = Parser(prog=f'texture {name}', description=summary(command))
             module.configure(parser)
     except KeyboardInterrupt:
         raise KeyboardInterrupt('nothing was requested') from None

@@ -188,7 +188,7 @@ class Operator:
         advice = 'start one, such as the emulator with `texture launch emulator`'
         with task(f'waiting for an explorer; {advice}', quiet_s=quiet_s):
             try:
-                self._until(self._explore.server_is_ready, deadline_s, f'no explorer answers; {advice}')
+                self.wait_until(self._explore.server_is_ready, deadline_s, f'no explorer answers; {advice}')
             except KeyboardInterrupt:
                 raise KeyboardInterrupt('nothing was requested') from None
 
@@ -209,16 +209,14 @@ class Operator:
         finally:
             self._node.destroy_subscription(subscription)
 
-    def wait_for_listeners(
-        self, topics: Sequence[str], number: int, guard: Callable[[], None], who: str = 'a node'
-    ) -> None:
+    def wait_for_listeners(self, topics: Sequence[str], number: int, guard: Callable[[], None]) -> None:
         """Wait until topics have `number` subscriptions and these are discovered; `guard` is called meanwhile."""
 
         def all_listen() -> bool:
             guard()
             return all(self._node.count_subscribers(topic) >= number for topic in topics)
 
-        self._until(all_listen, LISTENERS_DEADLINE_S, f'{who} has not subscribed to {", ".join(topics)} yet')
+        self.wait_until(all_listen, LISTENERS_DEADLINE_S, f'no node subscribes to {", ".join(topics)} yet')
         self._settle()
 
     def explore(

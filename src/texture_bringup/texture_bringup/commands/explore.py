@@ -355,12 +355,19 @@ def _evaluate_bag(bag: Path, surface: str, _slides: int) -> collection.PlaceAccu
     from texture_recordings.dataset import SlideDataset
 
     feature_set = FeatureSet.load(RECIPE)
-    BAGS_LOG.disabled = True  # the bag that is still recorded has no end yet
-    try:
+    with unfinished_bags():
         dataset = SlideDataset.from_bags([bag.parent], topics=feature_set.topics)
+    return evaluate_places(dataset.features(feature_set), surface)
+
+
+@contextmanager
+def unfinished_bags() -> Iterator[None]:
+    """Read bags that are still recorded, without the warning that they have no end."""
+    BAGS_LOG.disabled = True
+    try:
+        yield
     finally:
         BAGS_LOG.disabled = False
-    return evaluate_places(dataset.features(feature_set), surface)
 
 
 class Recorder(Child):
@@ -392,18 +399,20 @@ class Recorder(Child):
 
 @contextmanager
 def recorder(operator: Operator, bag: Path, namespace: str) -> Iterator[Recorder]:
-    """Record a bag, from when all that is to be recorded has been discovered."""
-    # By then all other nodes are discovered.
-    operator.wait_for_listeners(RECORDED, 1, lambda: None, 'the feature extractor')
-    wanted = {topic: operator.listeners(topic) + 1 for topic in RECORDED}
+    """Record a bag, once it holds what the nodes send."""
     with tempfile.TemporaryDirectory() as log, Recorder(bag, namespace, Path(log) / 'record.log') as recording:
-        for topic, number in wanted.items():
-            operator.wait_for_listeners((topic,), number, recording.check, 'the recorder that starts')
+        operator.wait_until(
+            lambda: records(bag, recording.check),
+            RECORDER_S,
+            f'the recorder that starts has no {" and ".join(RECORDED)}',
+        )
         yield recording
 
 
 def records(bag: Path, check: Callable[[], None]) -> bool:
     """Return whether a bag that is being recorded holds all of `RECORDED`: the idle explorer reports once a second."""
+    from texture_recordings.bags import topics_in
+
     check()
     with unfinished_bags(), suppress(InvalidData):  # nothing is written yet
         return set(RECORDED) <= {name.rpartition('/')[2] for name in topics_in(bag)}

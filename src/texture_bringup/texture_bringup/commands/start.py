@@ -66,7 +66,7 @@ def refuse_wrong(nodes: Sequence[NodeDescription], given: set[str]) -> None:
 
     In a separate process: a launcher that stays needs none of their libraries.
     """
-    wanted = []
+    wanted: list[tuple[str, ...]] = []
     for node in nodes:
         module, load, *names = LOOKED_AT.get(node.executable, ('', ''))
         known = {name: value for one in node.parameters if isinstance(one, Mapping) for name, value in one.items()}
