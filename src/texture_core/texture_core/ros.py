@@ -352,6 +352,7 @@ def run(
                 executor.shutdown(ANSWERING_S)  # a client that waits for an answer still gets it
             node.destroy_node()
         rclpy.try_shutdown()
+        _SOURCES.clear()
         for number in STOP_SIGNALS:  # another one must not interrupt the shutdown
             signal.signal(number, signal.SIG_IGN)
 
