@@ -111,7 +111,7 @@ def test_a_request_that_is_stopped_or_cancelled_while_it_waits_or_is_prepared_mo
             while len(explorer._requests) < len(asked):
                 pass
             explorer.table.now_ns += 1
-            assert explorer.stop('enough') == 'nothing is moving; what was requested is cancelled'
+            assert explorer.stop('enough') == 'what was requested is cancelled'
         connected.set()
         assert [one.exception(60.0).error for one in asked] == ends
     assert (explorer.table.states, explorer.current) == ([], None)

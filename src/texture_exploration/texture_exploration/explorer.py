@@ -161,13 +161,13 @@ class Explorer:
     def stop(self, reason: str, covers_s: float = 0.0) -> str:
         """Abort the exploration and all requests that came before or come within `covers_s`; return a sentence."""
         self._stopped_ns = self.clock() + round(covers_s * 1e9)
-        waiting = '; what was requested is cancelled' if self._requests else ''
+        waiting = bool(self._requests)
         if (current := self.current) is not None:
             current.stop(reason)
             return 'stopping; the finger is being lifted'
         with contextlib.suppress(DeviceError):
             self.arm.stop()
-        return f'nothing is moving{waiting}'
+        return 'what was requested is cancelled' if waiting else 'nothing is moving'
 
     def recover(self) -> None:
         """Free the arm from a fault by connecting again; the caller makes sure that it may move.
