@@ -56,6 +56,10 @@ def test_while_the_files_of_a_launch_are_checked_it_says_so(tmp_path: Path, monk
     assert capsys.readouterr().err.startswith('check the files that the launch names, ')
 
 
+def test_an_emulator_in_a_users_launch_file_may_leave_its_pipe_as_it_is() -> None:
+    refuse_wrong([NodeDescription('texture_simulation', 'emulator')], set())
+
+
 GIVEN = 'if="$(not-equals \'m$(var model)\' m)"'
 
 

@@ -185,12 +185,21 @@ class Operator:
 
     def wait_for_explorer(self, deadline_s: float, quiet_s: float | None = None) -> None:
         """Wait until explorations can be requested; the wait is shown after `quiet_s`."""
-        advice = 'start one, such as the emulator with `texture launch emulator`'
-        with task(f'waiting for an explorer; {advice}', quiet_s=quiet_s):
-            try:
+        advice, ours = 'start one, such as the emulator with `texture launch emulator`', self._node.get_namespace()
+        try:
+            with task(f"waiting for an explorer in the namespace '{ours}'; {advice}", quiet_s=quiet_s):
                 self.wait_until(self._explore.server_is_ready, deadline_s, f'no explorer answers; {advice}')
-            except KeyboardInterrupt:
-                raise KeyboardInterrupt('nothing was requested') from None
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt('nothing was requested') from None
+        except LaunchFailed as error:
+            nodes = self._node.get_node_names_and_namespaces()
+            others = ', '.join(sorted(space for name, space in nodes if name == 'explorer' and space != ours))
+            if not others:
+                raise
+            raise LaunchFailed(
+                f"no explorer answers in the namespace '{ours}' (waited {deadline_s:.0f} s); there are explorers in "
+                f'{others}: give one as --namespace'
+            ) from error
 
     def wait_for_node(self, name: str, deadline_s: float) -> None:
         """Wait until a node of the namespace is there."""
@@ -243,10 +252,7 @@ class Operator:
         accepted = self._explore.send_goal_async(action.Explore.Goal(request=to_msg(request)), on_feedback, goal_id)
         silent = 'the explorer accepts no request; stop it, and check that no second one runs'
         try:
-            self.wait_until(lambda: accepted.done() or stopped(), ACCEPT_S, silent, MotionAborted)
-            if stopped():
-                self._withdraw(goal_id)
-                self.wait_until(accepted.done, ACCEPT_S, silent, MotionAborted)
+            self.wait_until(accepted.done, ACCEPT_S, silent, MotionAborted)
         except MotionAborted as error:
             withdrawn = self._withdraw(goal_id)
             self._executor.spin_until_future_complete(withdrawn, CONFIRM_S)
@@ -258,12 +264,15 @@ class Operator:
             self._executor.spin_until_future_complete(accepted, CANCEL_DEADLINE_S)
             goal = accepted.result()
             raise KeyboardInterrupt(self._cancel(goal, goal.get_result_async()) if goal else _unconfirmed()) from None
-        goal = accepted.result()
+        goal, cancelled = accepted.result(), False
         endings = [goal.get_result_async()]
         deadline_s = time.monotonic() + (request.timeout_s + CANCEL_DEADLINE_S if request.timeout_s else math.inf)
         self._heard_s = asked_s = time.monotonic()
         try:
             while not any(ending.done() for ending in endings) and (now_s := time.monotonic()) < deadline_s:
+                if stopped() and not cancelled:  # once it is accepted: the explorer does not know an earlier cancel
+                    goal.cancel_goal_async()
+                    cancelled = True
                 self._step()
                 if now_s - self._heard_s > GONE_S:
                     raise MotionAborted(VANISHED)
@@ -308,7 +317,8 @@ class Operator:
 
     def stop(self) -> str:
         """Stop any motion; return the message of the explorer."""
-        answer = self._ask(Trigger, 'explorer/stop', Trigger.Request(), NOT_STOPPED, NOT_STOPPED, answer_s=STOP_S)
+        missing = f'no explorer offers a stop; start one, or give its --namespace, and {EMERGENCY}'
+        answer = self._ask(Trigger, 'explorer/stop', Trigger.Request(), missing, NOT_STOPPED, answer_s=STOP_S)
         return str(answer.message)
 
     def call(self, service: str, advice: str) -> tuple[bool, str]:

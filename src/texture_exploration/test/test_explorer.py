@@ -84,7 +84,7 @@ def test_stopping_lifts_the_finger(explorer):
     explorer.table.gate.set()
     assert exploration.ended.wait(DEADLINE_S)
     assert (exploration.outcome.message, explorer.counts['aborted']) == ('enough', 1)
-    assert explorer.stop('again') == 'nothing is moving'
+    assert explorer.stop('again') == 'no exploration is running; earlier requests are cancelled'
 
 
 @pytest.mark.parametrize(
@@ -98,6 +98,8 @@ def test_a_request_that_is_stopped_or_cancelled_while_it_waits_or_is_prepared_mo
     explorer, monkeypatch, cancelled, ends
 ):
     connecting, connected, connect = threading.Event(), threading.Event(), explorer.arm.connect
+    came, clock = [], explorer.clock
+    monkeypatch.setattr(explorer, 'clock', lambda: (came.append(None), clock())[1])
     monkeypatch.setattr(explorer.arm, 'connect', lambda: (connecting.set(), connected.wait(60.0), connect()))
     explorer.arm.fail('protective stop')
     withdrawn = threading.Event()
@@ -107,11 +109,12 @@ def test_a_request_that_is_stopped_or_cancelled_while_it_waits_or_is_prepared_mo
         if cancelled:
             withdrawn.set()
         else:  # two wait for the first one
+            came.clear()
             asked += [pool.submit(explorer.begin, 'two', QUICK), pool.submit(explorer.lift)]
-            while len(explorer._requests) < len(asked):
+            while len(came) < 2:  # each reads the clock when it comes
                 pass
             explorer.table.now_ns += 1
-            assert explorer.stop('enough') == 'nothing is moving; what was requested is cancelled'
+            assert 'earlier requests are cancelled' in explorer.stop('enough')
         connected.set()
         assert [one.exception(60.0).error for one in asked] == ends
     assert (explorer.table.states, explorer.current) == ([], None)

@@ -296,10 +296,11 @@ def test_two_motors_with_one_id_are_named(bus, hand):
     assert re.search(r"motor 5 \('press' of middle\) answers with data that .* two motors have this id", fault_of(hand))
 
 
-def test_firmware_whose_watchdog_is_known_not_to_stop_the_motor_is_reported(bus, hand):
-    bus.motors.tables[3][6] = bus.motors.tables[5][6] = 51
-    hand.connect()
-    assert hand.warning().startswith('the watchdog of motors 3, 5 may not stop them')
+def test_firmware_whose_watchdog_is_known_not_to_stop_the_motor_is_refused(bus, hand):
+    bus.motors.tables[5][6] = 51
+    with pytest.raises(DeviceError, match=r"motor 5 \('press' of middle\) has the firmware 51, .*; update it with"):
+        hand.connect()
+    assert not any(table[64] for table in bus.motors.tables.values())  # the torque of all is off
 
 
 def test_a_motor_with_a_latched_error_is_rebooted_by_a_recovery_and_one_that_keeps_it_is_named(bus, monkeypatch):

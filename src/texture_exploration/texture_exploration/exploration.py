@@ -240,16 +240,14 @@ class Exploration:
         """Return why it must end; a finger that was pushed out of the workspace may return first."""
         outside = self._limits.outside(arm.position)
         self._entered |= not outside
+        left = f'the finger left the workspace: {outside}' if outside and self._entered else ''
         frozen = self._force_watch.frozen(arm, self._commanded)
         reasons = (
             (ExplorationError.ARM_FAULT, arm.unsafe),
             (ExplorationError.FORCE_LIMIT, self._guard.violation(relative, self.state.phase)),
             (ExplorationError.FORCE_SENSOR, frozen),
             (ExplorationError.NO_SURFACE, self._off_surface(arm)),
-            (
-                ExplorationError.WORKSPACE,
-                f'the finger left the workspace: {outside}' if outside and self._entered else '',
-            ),
+            (ExplorationError.WORKSPACE, left),
             (ExplorationError.NO_SIGNAL, self._signal_fault(self._listening)),
             (ExplorationError.TIMEOUT, self._overdue(now_ns)),
         )

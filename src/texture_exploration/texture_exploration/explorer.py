@@ -5,17 +5,16 @@
 from __future__ import annotations
 
 import contextlib
-import math
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 
 from texture_core.config import look_up, place_of
 from texture_core.errors import DeviceError, ExplorationError, InvalidData, MotionAborted, MotionRefused, TextureError
 from texture_core.types import ExplorationRequest, ExplorationState
-from texture_exploration.arms.arm import Arm, SurfaceFrame, Vector
+from texture_exploration.arms.arm import POSE, Arm, SurfaceFrame, Vector
 from texture_exploration.exploration import Exploration, arm_fault, no_signal_watch
 from texture_exploration.guards import Listening, sound
 from texture_exploration.lift_first import Rise
@@ -69,7 +68,6 @@ class Explorer:
         self._thread: threading.Thread | None = None
         self._refuses = ''  # in a sentence, why requests are refused
         self._stopped_ns = clock()  # what was requested before it is refused
-        self._requests: list[int] = []  # when those came that wait for the arm, are prepared, or lift
         self._touches = SurfaceTouches()
 
     def connect(self) -> Vector:
@@ -101,13 +99,6 @@ class Explorer:
         if not self.arm.keeps_start:
             self._home = None
 
-    def arm_age_s(self) -> float:
-        """Return the age of the newest state of the arm, s; NaN if it cannot be reached."""
-        try:
-            return (self.clock() - self.arm.state().time_ns) * 1e-9
-        except DeviceError:
-            return math.nan
-
     def fault(self) -> str:
         """Return in a sentence why the arm cannot move now, '' if it can."""
         try:
@@ -122,33 +113,23 @@ class Explorer:
         current = self._current
         return current if current is not None and not current.ended.is_set() else None
 
-    @contextlib.contextmanager
-    def _turn(self) -> Iterator[Callable[[], bool]]:
-        """Wait until no other request is at work; the function says whether this one was stopped since it came."""
-        came_ns = self.clock()
-        self._requests.append(came_ns)
-        try:
-            with self._lock:
-                yield lambda: self._stopped_ns > came_ns
-        finally:
-            self._requests.remove(came_ns)
-
     def begin(
         self, exploration_id: str, request: ExplorationRequest, cancelled: Callable[[], bool] = lambda: False
     ) -> Exploration:
         """Begin an exploration in a separate thread, unless it was stopped or cancelled; wait for its event `ended`."""
-        with self._turn() as stopped:
+        came_ns = self.clock()  # before other requests are waited for
+        with self._lock:
             try:
                 self._current = exploration = self._prepare(exploration_id, request)  # what `stop` now finds
-                if stopped() or cancelled():
+                if self._stopped_ns > came_ns or cancelled():
                     self._current = None
-                    error = ExplorationError.STOPPED if stopped() else ExplorationError.CANCELLED
+                    error = ExplorationError.STOPPED if self._stopped_ns > came_ns else ExplorationError.CANCELLED
                     raise MotionRefused(f'the request was {error.name.lower()} before anything moved', error)
-            except TextureError:
+            except Exception as error:
                 self.counts['refused'] += 1
-                raise
-            except Exception as error:  # a fault of a user's planner; nothing has moved
-                self.counts['refused'] += 1
+                if isinstance(error, TextureError):
+                    raise
+                # A fault of a user's planner; nothing has moved.
                 why = place_of(error, request.motion.partition(':')[0]) or f'{type(error).__name__}: {error}'
                 raise MotionRefused(
                     f"planning '{request.motion}' failed with {why}; correct it there", ExplorationError.INVALID_REQUEST
@@ -161,13 +142,12 @@ class Explorer:
     def stop(self, reason: str, covers_s: float = 0.0) -> str:
         """Abort the exploration and all requests that came before or come within `covers_s`; return a sentence."""
         self._stopped_ns = self.clock() + round(covers_s * 1e9)
-        waiting = '; what was requested is cancelled' if self._requests else ''
         if (current := self.current) is not None:
             current.stop(reason)
             return 'stopping; the finger is being lifted'
         with contextlib.suppress(DeviceError):
             self.arm.stop()
-        return f'nothing is moving{waiting}'
+        return 'no exploration is running; earlier requests are cancelled'
 
     def recover(self) -> None:
         """Free the arm from a fault by connecting again; the caller makes sure that it may move.
@@ -187,7 +167,8 @@ class Explorer:
 
         The caller makes sure that the finger may rise; `stop` ends it.
         """
-        with self._turn() as stopped:
+        came_ns = self.clock()
+        with self._lock:
             self._check_idle()
             if self._home is None or self.fault():
                 self._home = self.connect()
@@ -196,7 +177,7 @@ class Explorer:
             rise.begin(self.clock(), self.arm.state())
             try:
                 while (command := rise.timed_step(self.clock(), self.arm.state())) is not None:
-                    if stopped():
+                    if self._stopped_ns > came_ns:
                         raise MotionAborted('it was stopped')
                     self.arm.command(command)
                     pace()
@@ -207,8 +188,7 @@ class Explorer:
             finally:
                 self.arm.stop()
             height_m, self.lifted = self.arm.state().position[2], True
-            x_m, y_m, z_m = self._home
-            self._home = (x_m, y_m, max(z_m, height_m))  # a place in contact is no start
+            self._home = (*self._home[:2], max(self._home[2], height_m))  # a place in contact is no start
             return height_m - begin_m
 
     def touch_surface(self) -> str:
@@ -247,8 +227,7 @@ class Explorer:
                 return f'{count}; touch the surface at {missing} more place{last}'
             self.arm.move_surface(fit.pose)
             self.patch = fit.patch
-            names = (f'surface_{name}' for name in ('x_m', 'y_m', 'z_m', 'rx_rad', 'ry_rad', 'rz_rad'))
-            numbers = {**dict(zip(names, fit.pose, strict=True)), **asdict(fit.patch)}
+            numbers = {**dict(zip(POSE, fit.pose, strict=True)), **asdict(fit.patch)}
             values = ', '.join(f'{name}: {value:.5f}' for name, value in numbers.items())
             return (
                 f'{count}; the surface is {values}; residual {1e3 * fit.residual_m:.2f} mm rms, largest '

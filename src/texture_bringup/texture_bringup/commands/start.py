@@ -71,8 +71,7 @@ def refuse_wrong(nodes: Sequence[NodeDescription], given: set[str]) -> None:
         module, load, *names = LOOKED_AT.get(node.executable, ('', ''))
         known = {name: value for one in node.parameters if isinstance(one, Mapping) for name, value in one.items()}
         values = [str(known.get(name, '')) for name in names]
-        if node.executable == 'emulator' and 'finger_pipe' in known:
-            # Only one can use the pipe; when its node refused it, a recorder would have made its bag.
+        if node.executable == 'emulator' and 'finger_pipe' in known:  # one uses it; else a recorder has made its bag
             wanted.append(('texture_core.types', 'FingerReceiver', str(known['finger_pipe'])))
         if all(values) and given.intersection(values):
             wanted.append((module, load, *values))

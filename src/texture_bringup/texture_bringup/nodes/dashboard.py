@@ -100,9 +100,11 @@ class DashboardNode(Node):
 
     async def stop(self, _requested: Mapping[str, Any]) -> Mapping[str, Any]:
         """Stop what moves, by a client that exists all the time: here nothing is waited for that can be avoided."""
-        cancelled = '; what this page requested is cancelled' if self._moving else ''
-        self._moving.clear()
-        self._interrupt()
+        cancelled = ''
+        if self._moving:  # once: a second signal would end a command before it has ended in order
+            cancelled = '; what this page requested is cancelled'
+            self._moving.clear()
+            self._interrupt()
         future, deadline_s = None, time.monotonic() + STOP_S
         while future is None or not future.done():
             if future is None and self._stop.service_is_ready():

@@ -200,6 +200,9 @@ def _rotation(axis: str) -> Any:
     return param(0.0, text, unit='rad', low=-7.0, high=7.0)
 
 
+POSE = ('surface_x_m', 'surface_y_m', 'surface_z_m', 'surface_rx_rad', 'surface_ry_rad', 'surface_rz_rad')
+
+
 @dataclass(frozen=True)
 class SurfacePoseParams:
     """Pose of the surface in the base frame of an arm; a base of the parameters of each arm with a base frame."""
@@ -213,14 +216,12 @@ class SurfacePoseParams:
 
     def at_surface(self: PoseParamsT, pose: Sequence[float]) -> PoseParamsT:
         """Return the parameters with another pose of the surface, (6,) as `surface_pose`."""
-        names = ('surface_x_m', 'surface_y_m', 'surface_z_m', 'surface_rx_rad', 'surface_ry_rad', 'surface_rz_rad')
-        return replace(self, **dict(zip(names, map(float, pose), strict=True)))
+        return replace(self, **dict(zip(POSE, map(float, pose), strict=True)))
 
     @property
     def surface_pose(self) -> tuple[float, ...]:
         """Pose of the surface in the base frame: place in m, then a rotation vector in rad, (6,)."""
-        origin = (self.surface_x_m, self.surface_y_m, self.surface_z_m)
-        return (*origin, self.surface_rx_rad, self.surface_ry_rad, self.surface_rz_rad)
+        return tuple(getattr(self, name) for name in POSE)
 
 
 class SurfaceFrame:
@@ -285,9 +286,8 @@ class SurfaceArm(Arm):
 # --------------------
 # One commander per robot: a lock that the kernel frees at any end of its holders, and the process that stops the robot.
 
-RUNTIME = Path(
-    '/dev/shm'
-)  # one per host, for all users; independent of environment variables and private folders of services
+# One per host, for all users; independent of environment variables and private folders of services.
+RUNTIME = Path('/dev/shm')
 DONE = b'.'
 LEAVE_S = 2.0
 ENDING = threading.Event()  # set once this process was asked to end

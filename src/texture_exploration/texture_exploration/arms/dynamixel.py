@@ -38,7 +38,6 @@ PACKET_ID, PACKET_LENGTH, PACKET_PARAMETERS = 4, 5, 9
 NO_PARAMETERS = 4  # length of a status packet without parameters
 SYNC_WRITE, BROADCAST = 0x83, 0xFE  # instruction, and the id of all motors
 OPERATING_MODE = 5  # current-based position: in any other the current does not bound the force
-FIRMWARE = 6  # address of its version, of one byte, in all control tables of protocol 2.0
 TRIPPED = 0xFF  # the register of the Bus Watchdog after it has stopped the motor
 RESTART_S = 3.0  # a motor has rebooted within
 LOCKED_S = 1.0  # the guard of a killed process has released the motors within
@@ -71,7 +70,6 @@ class DynamixelBus:
             ) from error
         self.missing: set[int] = set()
         self.limits_a: dict[int, float] = {}
-        self.deaf: set[int] = set()  # motors whose watchdog may not stop them
         self._reasons: dict[int, str] = {}  # why a motor is missing, unless it is silent
         self._energised: set[int] = set()
         self._goal_currents: dict[int, int] = {}  # as sent last
@@ -163,10 +161,12 @@ class DynamixelBus:
         self._arm(motor, 'operating_mode', OPERATING_MODE)
         for register, value in profile.gains.items():
             self.write(motor, register, value)
-        with self._line():
-            firmware, result, _ = self._packets.read1ByteTxRx(self._port, motor, FIRMWARE)
-        if result == SUCCESS and goes_on(model, firmware):
-            self.deaf.add(motor)
+        firmware = self.read_register(motor, 'firmware')
+        if profile.watchdog and firmware is not None and goes_on(model, firmware):
+            raise DeviceError(
+                f'{profile.owner(motor)} has the firmware {firmware}, whose watchdog is known not to stop the motor '
+                'when the cable is out or the computer hangs; update it with DYNAMIXEL Wizard'
+            )
         limit = self.read_register(motor, 'current_limit')
         if limit is None:
             return False

@@ -44,7 +44,7 @@ X_SERIES: Mapping[str, tuple[int, int]] = {
     'operating_mode': (11, 1), 'current_limit': (38, 2), 'torque_enable': (64, 1), 'hardware_error': (70, 1),
     'position_d': (80, 2), 'position_i': (82, 2), 'position_p': (84, 2), 'bus_watchdog': (98, 1),
     'goal_current': (102, 2), 'goal_position': (116, 4), 'present_current': (126, 2), 'present_velocity': (128, 4),
-    'present_position': (132, 4),
+    'present_position': (132, 4), 'firmware': (6, 1),
 }  # fmt: skip
 POSITION_RAD, ZERO = 0.001533981, 2048  # per count, and the counts of the middle position
 VELOCITY_RAD_S = 0.0239691  # per count

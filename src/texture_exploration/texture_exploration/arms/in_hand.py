@@ -83,7 +83,6 @@ class InHandArm(Arm):
         self._fingers = {name: DynamixelFinger(joints, self.profile) for name, joints in self.profile.fingers.items()}
         self._state: HandState | None = None
         self._failure = NOT_CONNECTED
-        self._doubt = ''
         self._rebooted = False  # since the last connection
         self._highest_a: Mapping[int, float] = {}
         self._grips = False
@@ -97,7 +96,7 @@ class InHandArm(Arm):
         self.close()
         self._closing.clear()
         self._fresh.clear()
-        self._failure = self._doubt = ''
+        self._failure = ''
         self._thread = threading.Thread(target=self._run, name='dynamixel', daemon=True)
         self._thread.start()
         try:
@@ -156,10 +155,6 @@ class InHandArm(Arm):
         """Stop the sliding fingers; the others keep holding."""
         self.command(STANDSTILL)
 
-    def warning(self) -> str:
-        """Return what is not as it should be although the hand moves, '' if nothing."""
-        return self._doubt
-
     def recover(self) -> None:
         """Release the object, reboot the motors that report a hardware error, and stay unconnected."""
         self.close()
@@ -217,7 +212,6 @@ class InHandArm(Arm):
             self._highest_a = bus.limits_a
             bus.start(rebooted=self._rebooted)
             self._rebooted = False
-            self._doubt = self._doubtful(bus.deaf)
             self._control_loop(bus)
         except DeviceError as error:
             self._failure = str(error)
@@ -253,16 +247,6 @@ class InHandArm(Arm):
             stepped_s = now_s
             self._publish(bus, errors)
             bus.write_goals(goals)
-
-    def _doubtful(self, deaf: Iterable[int]) -> str:
-        """Return a warning about motors whose watchdog may not stop them, '' if there are none."""
-        numbers = ', '.join(map(str, sorted(deaf)))
-        if not numbers or not self.profile.watchdog:
-            return ''
-        return (
-            f'the watchdog of motors {numbers} may not stop them when the cable is out or the computer hangs: their '
-            'firmware is known to go on; update it with DYNAMIXEL Wizard'
-        )
 
     def _step(self, motors: Mapping[int, MotorState], dt_s: float, now_s: float) -> dict[int, tuple[float, float]]:
         command, given_s = self._command
@@ -345,9 +329,8 @@ class DynamixelFinger:
             self._advance('press', -command.normal_m_s * dt_s / joint.lever_m, SLACK_RAD)
             return self._profile.move_a, self._goal['press']
         self._advance('press', CLOSING_M_S * dt_s / joint.lever_m, REACH_RAD)
-        return self._profile.idle_a + command.force_n * abs(joint.lever_m) / self._profile.torque_nm_a, self._goal[
-            'press'
-        ]
+        current_a = self._profile.idle_a + command.force_n * abs(joint.lever_m) / self._profile.torque_nm_a
+        return current_a, self._goal['press']
 
     def _advance(self, role: str, angle_rad: float, max_lead_rad: float) -> None:
         at = self._motors[role].position_rad

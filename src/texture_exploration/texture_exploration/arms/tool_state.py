@@ -184,9 +184,8 @@ class ToolState:
         self._stamps_ns = {'pose': -1, 'force': -1}
         self._late = {'pose': '', 'force': ''}
         self._ahead_ns = {'pose': 0, 'force': 0}  # stamps that come from the future
-        self.misplaced = self.garbled = (
-            ''  # a frame that is not known; a sample that is no measurement, and was not taken
-        )
+        # A frame that is not known; a sample that is no measurement, and was not taken.
+        self.misplaced = self.garbled = ''
         self.listening = WITHOUT_GAPS
         self.rotation: Array = np.eye(3)  # of the tool in the base frame
         self._position: Vector = (math.nan, math.nan, math.nan)

@@ -95,17 +95,15 @@ class UrArmParams(ZeroingParams, SurfacePoseParams):
 
 RATE_HZ = 250.0  # of commands and states: half of that of an e-Series
 DELAY_S = 0.02  # from a force to the motion that responds to it: walls were pressed with 26 to 40 N at 50 mm/s
-ACKNOWLEDGE_S = (
-    1.0  # time that a controller may take to stop, to end force control and to zero; its watchdog waits as long
-)
+# Time that a controller may take to stop, to end force control and to zero; its watchdog waits as long.
+ACKNOWLEDGE_S = 1.0
 PROBE_S = 1.5  # time that it may take to answer the first requests
 
 # --------------------
 # The worker process, for its parent: start it, exchange messages with it, end it.
 
 MODULE = 'texture_exploration.arms.ur_worker'
-UR_LINK_STOPPING_S = 1.5  # time to brake, in addition to the acknowledgement of the controller
-ACKNOWLEDGEMENTS = 2  # of a stop and of the end of force control
+STOPPING_S = 1.5 + 2 * ACKNOWLEDGE_S  # to brake, and for the acknowledgements of a stop and of the end of force control
 FINAL_MESSAGE_S = 0.05
 
 
@@ -116,7 +114,6 @@ class WorkerLink:
         self.report: UrReport | None = None
         self._failure = ''
         self._timeout_s = params.connect_timeout_s
-        self._stopping_s = UR_LINK_STOPPING_S + ACKNOWLEDGEMENTS * ACKNOWLEDGE_S
         self._state_received = threading.Event()
         self._channel, end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         command = [sys.executable, '-m', MODULE, str(end.fileno()), json.dumps(dataclasses.asdict(params))]
@@ -161,7 +158,7 @@ class WorkerLink:
         """Stop the arm and end the worker; kill it if it does not end: then the watchdog stops the arm."""
         self._channel.shutdown(socket.SHUT_RDWR)
         try:
-            self.process.wait(self._stopping_s)
+            self.process.wait(STOPPING_S)
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
@@ -403,7 +400,7 @@ class UrArm(SurfaceArm):
             )
         params = self._params
         try:
-            self._lock = claim(f'ur {params.ip}', UR_LINK_STOPPING_S + ACKNOWLEDGEMENTS * ACKNOWLEDGE_S)
+            self._lock = claim(f'ur {params.ip}', STOPPING_S)
             version = check_ready(params.ip)
             check_program(params, pause_is_ours=self._paused)
             self._link, self._series = WorkerLink(params, self._lock), version[0]

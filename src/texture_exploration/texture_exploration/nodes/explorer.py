@@ -475,7 +475,6 @@ class ExplorerNode(PatientLifecycleNode):
             'exploration': current.exploration_id if current else '',
             'last_end': self._last_end,
             'arm_fault': fault or 'none',
-            'arm_state_age_s': self._explorer.arm_age_s(),
             **self._explorer.counts,
         }
         if not self._active:

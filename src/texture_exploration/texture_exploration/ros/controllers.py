@@ -95,10 +95,10 @@ class RosTopics:
         topics = (self._twists.topic_name, self._frame_id, self._poses.topic_name)
         self._guard = guard = TwistGuard(node.get_namespace(), topics, self._lock)
         end_s = time.monotonic() + GUARD_START_S
-        while not (guard.fault() or guard.participant):  # the time of the controllers begins when it runs
+        while not guard.participant:  # the time of the controllers begins when it runs
             give_up_when_ending()
-            if time.monotonic() > end_s:
-                raise DeviceError(NO_GUARD)
+            if fault := guard.fault() or NO_GUARD * (time.monotonic() > end_s):
+                raise DeviceError(fault)
             time.sleep(LOOKING_S)
         if not (params.controller_timeout_s or scope()):
             node.get_logger().warning(
