@@ -590,7 +590,15 @@ BAGS: dict[str, tuple[Write, Truth]] = {
         database('CREATE TABLE v (y, x BLOB AS (zeroblob(1000000000)))'), "'v' in it is none of the plain tables",
     ),
     'SQLite with a large message': (
-        database('UPDATE messages SET data = zeroblob(5000000) WHERE id = 9'), 'a message of 5 MB; at most 4 MB',
+        database('UPDATE messages SET data = zeroblob(300000000) WHERE id = 9'), 'a message of 300 MB; at most 200 MB',
+    ),
+    'SQLite with large messages of another topic': (
+        database(
+            'INSERT INTO topics SELECT 99, "/image", type, serialization_format, offered_qos_profiles, '
+            'type_description_hash FROM topics LIMIT 1; '
+            'INSERT INTO messages SELECT 9999, 99, timestamp, zeroblob(5000000) FROM messages LIMIT 1'
+        ),
+        HALVES,
     ),
     'an array of many messages': (
         foreign(f'my_msgs/B[100000] e\n{B}'), 'A has 100001 values by the lengths of its arrays; at most 2000',
