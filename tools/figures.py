@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write the tables of figures in the pages from the stored JSON: `python tools/figures.py`; `--check` only compares.
 
-The check also fails where a stored experiment of a paper, or a stored definition of a recipe, is not of the present code.
+The check also fails where a stored experiment of a paper or definition of a recipe is not of the present code.
 
 A page marks where a table goes, and its rows between the marks are replaced:
 
