@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write the tables of figures in the pages from the stored JSON: `python tools/figures.py`; `--check` only compares.
 
-The check also fails where a stored experiment of a paper is not of the present code.
+The check also fails where a stored experiment of a paper or definition of a recipe is not of the present code.
 
 A page marks where a table goes, and its rows between the marks are replaced:
 
@@ -20,7 +20,7 @@ import argparse
 import json
 import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -96,6 +96,27 @@ def stale(root: Path, digests: Mapping[str, Callable[[], Mapping[str, str]]]) ->
     return faults
 
 
+def definitions(held: Any, name: str = '') -> Iterator[tuple[str, str]]:
+    """Yield each recipe by whose name figures are stored with the digest of its definition, and that digest."""
+    if isinstance(held, dict):
+        yield from [(name, held['definition'])] if 'definition' in held else []
+        for key, value in held.items():
+            yield from definitions(value, key)
+
+
+def outdated(root: Path, digest_of: Callable[[str], str]) -> list[str]:
+    """Return which benchmarks are stored with a definition of a recipe that is not today's."""
+    faults = []
+    for path in sorted((root / 'docs' / 'charts').glob('*.json')):
+        changed = sorted({name for name, digest in definitions(numbers(path)) if digest != digest_of(name)})
+        if changed:
+            faults.append(
+                f'{path.name}: recipes changed since it was measured: {", ".join(changed)}; '
+                f'run texture benchmark {path.stem}'
+            )
+    return faults
+
+
 def main(root: Path = ROOT) -> int:
     """Fill the tables of the pages, or check them."""
     parser = argparse.ArgumentParser(description=main.__doc__)
@@ -115,9 +136,11 @@ def main(root: Path = ROOT) -> int:
         elif filled != page:
             path.write_text(filled, encoding='utf-8')
     if only_check:
-        from texture_papers.catalogue import DIGESTS  # noqa: PLC0415  # takes seconds, and filling tables needs none
+        # ruff: noqa: PLC0415  # these take seconds, and filling tables needs none
+        from texture_papers.catalogue import DIGESTS
+        from texture_papers.protocol import digest_of
 
-        faults += stale(root, DIGESTS)
+        faults += [*stale(root, DIGESTS), *outdated(root, digest_of)]
     unused = {path.stem for path in (root / 'docs' / 'tables').glob('*.md')} - used
     faults += [f'docs/tables/{name}.md: no page shows this table' for name in sorted(unused)]
     print('\n'.join(faults), end='\n' if faults else '')

@@ -34,7 +34,6 @@ from texture_exploration.arms.catalogue import ARMS
 from texture_exploration.motions import MOTIONS
 from texture_features.feature_set import FEATURES
 from texture_papers.catalogue import DIGESTS
-from texture_papers.protocol import digest_of
 from texture_simulation.effects import EFFECTS
 from texture_simulation.friction import FRICTIONS
 from texture_simulation.scene import load_scene
@@ -329,14 +328,8 @@ def later(root: Path) -> str:
     for name, cell in sorted(cells.items(), key=lambda item: -item[1]['window_accuracy']):
         after = cell['accuracy_at_s']['5.0']
         fractions = (cell['window_accuracy'], after, cell['unclassified_windows'])
-        rows.append(f'| {name} | {" | ".join(map(percent, fractions))} | {_definition(name, cell)} |')
+        rows.append(f'| {name} | {" | ".join(map(percent, fractions))} | {cell["definition"]} |')
     return '\n'.join(rows) + '\n'
-
-
-def _definition(recipe: str, cell: dict[str, Any]) -> str:
-    """Return the digest of the definition that was measured, or that it was an earlier one than the present."""
-    measured = cell.get('definition')
-    return measured if measured and measured == digest_of(recipe) else 'an earlier one'
 
 
 def percent(fraction: float | list[float] | None) -> str:

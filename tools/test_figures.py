@@ -34,7 +34,8 @@ def root(tmp_path: Path) -> Path:
 def run(root: Path, monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
     """Run the tool as a person does."""
     monkeypatch.setattr(sys, 'argv', ['figures.py', *arguments])
-    monkeypatch.setattr(figures, 'stale', lambda *_: [])  # minutes on a busy machine: `make check` has it
+    for name in ('stale', 'outdated'):
+        monkeypatch.setattr(figures, name, lambda *_: [])  # minutes on a busy machine: `make lint` has them
     return figures.main(root)
 
 
@@ -90,6 +91,15 @@ def test_a_stored_experiment_of_other_code_than_todays_is_a_fault_that_gives_its
     assert 'task, one; task, gone; run texture experiment hu --tune --seeds 5' in fault
     (root / 'docs/charts/jamali.json').write_text(json.dumps({'numbers': {'digests': now}}))
     assert figures.stale(root, {'jamali': lambda: now}) == []
+
+
+def test_figures_of_a_recipe_that_changed_are_a_fault_that_gives_its_name_and_the_command(root: Path) -> None:
+    cells = {'taxels': {'default': {'definition': 'abcd1234'}, 'any-place': {'definition': 'ffff0000'}, 'svc': {}}}
+    (root / 'docs/charts/overview.json').write_text(json.dumps({'numbers': cells}))
+    today = {'default': 'abcd1234', 'any-place': 'abcd1234'}
+    [fault] = figures.outdated(root, today.__getitem__)
+    assert fault == ('overview.json: recipes changed since it was measured: any-place; run texture benchmark overview')
+    assert figures.outdated(root, {**today, 'any-place': 'ffff0000'}.__getitem__) == []
 
 
 def test_every_table_of_the_pages_is_the_stored_one(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -220,5 +220,5 @@ def run_program(action: Callable[[], int], name: str = 'texture') -> int:
         print(f"{name}: '{error.filename}' cannot be used: {error.strerror}; give another path", file=sys.stderr)
         return USER_ERROR
     except KeyboardInterrupt as interrupt:
-        print(f'{name}: interrupted{f"; {interrupt}" * bool(str(interrupt))}', file=sys.stderr)
+        print('; '.join(filter(None, (f'{name}: interrupted', str(interrupt)))), file=sys.stderr)
         return INTERRUPTED

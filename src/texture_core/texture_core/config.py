@@ -373,8 +373,9 @@ def check_parameter_file(path: Path) -> None:
     def fits(section: Any) -> bool:
         if not isinstance(section, Mapping):
             return False
-        inner = section.get('ros__parameters', section)
-        return isinstance(inner, Mapping) and (inner is not section or all(map(fits, section.values())))
+        if 'ros__parameters' in section:
+            return isinstance(section['ros__parameters'], Mapping)
+        return all(map(fits, section.values()))
 
     try:
         content = load_yaml(path, 'parameter file')

@@ -292,12 +292,11 @@ def summary(report: EvaluationReport) -> list[str]:
         f'processor time of a window: {latency["median"]:.0f} µs median, {latency["p99"]:.0f} µs 99th percentile',
     ]
     if report.known:
-        end, soon = (
-            ', '.join(f'{name} {percent(of[key])}' for name, key in ENDS.items() if key in of)
-            for of in (figures, figures['once_decided'])
-        )
         of = f'of the {len(report.known)} slides over trained surfaces'
-        lines += [f'{of}, at the end: {end}', f'{of}, once decided: {soon}', by_reason(figures['rejections'])]
+        for when, ends in (('at the end', figures), ('once decided', figures['once_decided'])):
+            shown = (f'{name} {percent(ends[key])}' for name, key in ENDS.items() if key in ends)
+            lines.append(f'{of}, {when}: {", ".join(shown)}')
+        lines.append(by_reason(figures['rejections']))
     if report.unknown:
         accepted, rejected = percent(figures['unknown_accepted']), by_reason(figures['rejections_of_untrained'])
         lines.append(f'of the {len(report.unknown)} slides over other surfaces: accepted {accepted}; {rejected}')

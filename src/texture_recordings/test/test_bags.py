@@ -173,6 +173,15 @@ def test_a_missing_bag_a_foreign_folder_and_a_foreign_file_are_refused_with_a_se
             list(read_bag(foreign))
 
 
+def test_a_batch_of_many_channels_at_a_high_rate_is_read_as_it_was_written(tmp_path: Path) -> None:
+    samples = np.zeros((20_000, 64), dtype=np.float32)
+    signal = TactileSignal(1, 'daq', ('x',) * 64, ('V',) * 64, 200_000.0, 0, samples)
+    with BagWriter(tmp_path / 'bag') as bag:
+        bag.write('signal', signal, 1)
+    [(_, _, read)] = read_bag(tmp_path / 'bag')
+    assert read.samples.shape == samples.shape
+
+
 def test_a_bag_with_other_messages_is_refused_and_an_empty_one_yields_nothing(tmp_path: Path) -> None:
     with BagWriter(tmp_path / 'empty'):
         pass

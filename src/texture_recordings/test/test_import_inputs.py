@@ -590,7 +590,15 @@ BAGS: dict[str, tuple[Write, Truth]] = {
         database('CREATE TABLE v (y, x BLOB AS (zeroblob(1000000000)))'), "'v' in it is none of the plain tables",
     ),
     'SQLite with a large message': (
-        database('UPDATE messages SET data = zeroblob(5000000) WHERE id = 9'), 'a message of 5 MB; at most 4 MB',
+        database('UPDATE messages SET data = zeroblob(300000000) WHERE id = 9'), 'a message of 300 MB; at most 200 MB',
+    ),
+    'SQLite with large messages of another topic': (
+        database(
+            'INSERT INTO topics SELECT 99, "/image", type, serialization_format, offered_qos_profiles, '
+            'type_description_hash FROM topics LIMIT 1; '
+            'INSERT INTO messages SELECT 9999, 99, timestamp, zeroblob(5000000) FROM messages LIMIT 1'
+        ),
+        HALVES,
     ),
     'an array of many messages': (
         foreign(f'my_msgs/B[100000] e\n{B}'), 'A has 100001 values by the lengths of its arrays; at most 2000',
@@ -712,12 +720,14 @@ def test_blanks_belong_to_the_slower_stream(tmp_path: Path, every: int) -> None:
 @pytest.mark.parametrize('per_row', [2, 22, 100])
 def test_consecutive_samples_of_a_row_are_one_channel(tmp_path: Path, per_row: int) -> None:
     pac, slow = np.random.default_rng(0).normal(size=(per_row, 120)), np.arange(120.0)
+    pac[:2, 7] = np.nan
     scipy.io.savemat(tmp_path / 'cork_1.mat', {'pac': pac, 'pdc': slow[None]})
     signal = {'columns': ['pac.*'], 'rate_hz': 100.0 * per_row, 'samples_per_row': per_row}
     static = {'columns': ['pdc'], 'rate_hz': 100.0}
     report = run(tmp_path, streams={'signal': signal, 'signal_static': static}, format={'transpose': True})
     [samples], _ = SlideDataset.from_bags(report.bags).to_numpy()
     np.testing.assert_allclose(samples[:, 0], pac.T.ravel(), atol=1e-6)
+    assert report.streams['cork', 'signal']['NaN'] == 2
 
 
 ACC = np.stack([X, 2 * X], axis=1)

@@ -82,7 +82,7 @@ except ModuleNotFoundError as error:  # rosbags brings the others
 
 MAX_METADATA_BYTES = 100_000  # of metadata.yaml: a file of 600 parts
 MAX_UNPACKED_BYTES, MAX_RATIO = 200 * MB, 100  # of a bag or what is held at once; ratio of unpacked to packed size
-MAX_MESSAGE_BYTES = 4 * MB  # whose elements of a byte take 150 each as objects
+MAX_MESSAGE_BYTES = 4 * MB  # of one of others, whose elements of a byte take 150 each as objects
 SQLITE = b'SQLite format 3\0'
 # The tables and indices of a bag by SQLite: no views, no computed columns.
 PLAIN_SQL = re.compile(r'CREATE (TABLE|INDEX) \w+\s*(ON \w+\s*)?\([^()]*\)')
@@ -536,9 +536,9 @@ def _read(
             missing = sum(connection.msgcount for connection in connections)
             for connection, log_ns, data in bag.messages(connections, start_ns, stop_ns):
                 missing -= 1
-                if len(data) > MAX_MESSAGE_BYTES:
-                    raise InvalidData(
-                        f"the bag '{path}' has a message of {len(data) / MB:.3g} MB on '{connection.topic}'; at most "
+                if foreign and len(data) > MAX_MESSAGE_BYTES:
+                    raise FileRefused(
+                        f"it has a message of {len(data) / MB:.3g} MB on '{connection.topic}'; at most "
                         f'{MAX_MESSAGE_BYTES // MB} MB are read'
                     )
                 name = names.get(connection.topic, connection.topic)
@@ -576,9 +576,7 @@ def _check_database(path: Path) -> None:
         for name, sql in database.execute('SELECT name, sql FROM sqlite_master'):
             if sql and not PLAIN_SQL.fullmatch(sql):
                 raise FileRefused(f"'{name}' in it is none of the plain tables of a bag, and may compute without end")
-        largest = database.execute('SELECT max(length(data)) FROM messages').fetchone()[0] or 0
-    if largest > MAX_MESSAGE_BYTES:
-        raise FileRefused(f'it has a message of {largest / MB:.3g} MB; at most {MAX_MESSAGE_BYTES // MB} MB are read')
+        _check_held(database.execute('SELECT max(length(data)) FROM messages').fetchone()[0] or 0, 'a message')
 
 
 def _files(path: Path) -> list[Path]:

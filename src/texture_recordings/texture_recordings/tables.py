@@ -609,10 +609,10 @@ class FrameSlides:
                 self._report.streams[surface, stream.name][reason] += stream.per_row * left
             else:
                 self._report.leave_out(f"{reason} of '{stream.name}'", left, f"'{self._place}'")
-        self._report.streams[surface, stream.name]['NaN'] += int(np.isnan(samples[rows]).any(axis=1).sum())
         # Successive columns that are consecutive samples of one channel.
         count = stream.per_row
         flat = samples[rows].reshape(len(rows), -1, count).transpose(0, 2, 1).reshape(len(rows) * count, -1)
+        self._report.streams[surface, stream.name]['NaN'] += int(np.isnan(flat).any(axis=1).sum())
         units, sensor = (stream.params.unit,) * len(stream.channels), self._mapping.sensor
         signal = TactileSignal(0, sensor, stream.channels, units, stream.rate_hz * count, 0, flat, sensor)
         return signal, np.add.outer(index * count, np.arange(count)).ravel()
