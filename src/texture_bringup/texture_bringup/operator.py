@@ -148,6 +148,12 @@ class ExplorationResult:
         return self.error is ExplorationError.NONE
 
 
+def _given_up(goal: Any, why: str) -> MotionAborted:
+    """Cancel a request that is given up, as an explorer that only hung must not begin it later; return the error."""
+    goal.cancel_goal_async()
+    return MotionAborted(why)
+
+
 def _unconfirmed() -> str:
     """Return what an operator must know whose stop was not answered."""
     return (
@@ -275,7 +281,7 @@ class Operator:
                     cancelled = True
                 self._step()
                 if now_s - self._heard_s > GONE_S:
-                    raise MotionAborted(VANISHED)
+                    raise _given_up(goal, VANISHED)
                 if now_s - asked_s > RETRY_PERIOD_S:  # a restarted explorer answers that the goal is unknown
                     endings.append(goal.get_result_async())
                     asked_s = now_s
@@ -283,10 +289,8 @@ class Operator:
             raise KeyboardInterrupt(self._cancel(goal, endings[0])) from None
         answer = next((ending.result() for ending in endings if ending.done()), None)
         if answer is None:
-            goal.cancel_goal_async()
-            raise MotionAborted(
-                f'no result within the timeout of {request.timeout_s:g} s; the exploration was cancelled'
-            )
+            late = f'no result within the timeout of {request.timeout_s:g} s; the exploration was cancelled'
+            raise _given_up(goal, late)
         if answer.status == GoalStatus.STATUS_UNKNOWN:
             raise MotionAborted(RESTARTED)
         result = answer.result.result
