@@ -412,6 +412,18 @@ def parse_yaml(text: str) -> Any:
     return yaml.load(text, _PlainLoader)
 
 
+class _PlainDumper(yaml.SafeDumper):
+    """Writes no aliases, as none are read."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+def yaml_text(content: Any) -> str:
+    """Return plain values as YAML that `parse_yaml` reads."""
+    return str(yaml.dump(content, Dumper=_PlainDumper, sort_keys=False, allow_unicode=True, width=120))
+
+
 def load_json(path: Path, most_bytes: int) -> Any:
     """Return the plain values in a JSON file."""
     return parse_json(read_text(path, most_bytes))

@@ -10,9 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
-from texture_core.config import library, writing
+from texture_core.config import library, writing, yaml_text
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.types import AnyArray
 from texture_recordings.dataset import SlideDataset
@@ -43,8 +42,7 @@ def export_slides(dataset: SlideDataset, out: str | Path) -> list[str]:
         folder.mkdir(parents=True)
         for topic, samples in streams.items():
             write_parquet(samples, folder / f'{topic}.parquet')
-            text = yaml.safe_dump(_mapping(topic, samples), sort_keys=False, allow_unicode=True)
-            (folder / f'{topic}.yaml').write_text(text, encoding='utf-8')
+            (folder / f'{topic}.yaml').write_text(yaml_text(_mapping(topic, samples)), encoding='utf-8')
             surfaces = len({one.surface for one in samples})
             lines.append(
                 f"{len(samples)} slides over {surfaces} surfaces in '{folder / topic}.parquet'; "

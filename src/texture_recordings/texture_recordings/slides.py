@@ -242,7 +242,7 @@ def find_slides(
         labelled += slides_of_bag
     if not labelled:
         states = [state for path in paths for _, _, state in read_bag(path, (EXPLORATION,), namespace)]
-        if not any(state.phase is Phase.SLIDE for state in states):
+        if states and not any(state.phase is Phase.SLIDE for state in states):
             raise InvalidData(
                 f'no exploration in {_named(paths)} came to its slide: each was refused or aborted before; record '
                 "again, and keep what ends with 'the motion was completed'"
