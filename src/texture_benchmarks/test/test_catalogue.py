@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.image import imread
 from matplotlib.text import Text
-from PIL import Image
 
 from texture_benchmarks.catalogue import BENCHMARKS, run_benchmark
 from texture_benchmarks.generalisation import generalisation_chart
@@ -16,7 +16,7 @@ from texture_benchmarks.scenes import ablation_chart
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult
 from texture_benchmarks.trust import failures_chart
 from texture_bringup.command import main
-from texture_evaluation.charts import REDUCED, chart
+from texture_evaluation.charts import DPI, REDUCED, chart
 
 pytestmark = pytest.mark.ros
 
@@ -53,8 +53,7 @@ def test_the_charts_of_the_pages_can_be_read_on_a_phone_and_drawn_from_the_store
     saved = Figure.savefig
     monkeypatch.setattr(Figure, 'savefig', note_sizes)
     path = draw(numbers, tmp_path / 'chart.png')
-    with Image.open(path) as picture:
-        width_in = picture.width / picture.info['dpi'][0]
+    width_in = imread(path).shape[1] / DPI
     assert min(sizes) / 72 / width_in * 380 >= 9, 'text below 9 pixels on a phone'
 
 

@@ -114,7 +114,7 @@ def test_lost_samples_are_reported_once_and_at_the_end(collected, tmp_path, monk
 
 
 def test_a_slide_counts_when_the_recorder_has_it_on_the_disk(tmp_path, monkeypatch):
-    recording = explore.BagRecorder(tmp_path / 'bag', '', tmp_path / 'log')
+    recording = explore.RecorderProcess(tmp_path / 'bag', '', tmp_path / 'log')
     recording.log.write_text("[record]: exploration 'a' is on the disk: 9 messages recorded, nothing lost\n")
     assert recording.wait_for('a') == ''
     with recording.log.open('a') as log:

@@ -27,7 +27,6 @@ from texture_core.config import (
     PARSE_ERRORS,
     FileRefused,
     check_parameter_file,
-    dump_yaml,
     executable,
     find,
     find_file,
@@ -36,6 +35,7 @@ from texture_core.config import (
     prefix,
     read_bounded,
     unknown_name,
+    yaml_text,
 )
 from texture_core.errors import InvalidLaunch, LaunchFailed, TextureError, UnknownName
 
@@ -158,7 +158,7 @@ def command(node: NodeDescription, parameter_folder: Path) -> list[str]:
         file = parameters if isinstance(parameters, Path) else parameter_folder / f'{index}.yaml'
         if not isinstance(parameters, Path):
             parameter_folder.mkdir(parents=True, exist_ok=True)
-            file.write_text(dump_yaml({node.parameter_key: {'ros__parameters': dict(parameters)}}))
+            file.write_text(yaml_text({node.parameter_key: {'ros__parameters': dict(parameters)}}))
         options += ['--params-file', str(file)]
     options += [word for source, target in node.remappings for word in ('-r', f'{source}:={target}')]
     return [str(executable(node.package, node.executable)), '--ros-args', *options]

@@ -30,9 +30,11 @@ from texture_core.config import (
     open_regular,
     param,
     parameters_of,
+    parse_yaml,
     read_array,
     read_bounded,
     read_text,
+    yaml_text,
 )
 from texture_core.errors import InvalidParameter, UnknownName
 
@@ -252,6 +254,13 @@ def test_no_more_of_a_member_is_unpacked_than_the_directory_states() -> None:
         assert tracemalloc.get_traced_memory()[1] < 1_000_000
     finally:
         tracemalloc.stop()
+
+
+def test_values_that_are_one_object_are_written_as_they_are_read() -> None:
+    shared = ['ä', 1.5]
+    content = {'b': shared, 'a': shared, 'c': {'d': shared}}
+    assert parse_yaml(yaml_text(content)) == content
+    assert list(parse_yaml(yaml_text(content))) == ['b', 'a', 'c']
 
 
 @pytest.mark.parametrize('method', [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])

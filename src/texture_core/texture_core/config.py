@@ -405,23 +405,23 @@ class _PlainLoader(yaml.SafeLoader):
         return super().compose_node(parent, index)
 
 
-class _PlainDumper(yaml.SafeDumper):
-    """Writes no aliases, which are not read."""
-
-    def ignore_aliases(self, data: Any) -> bool:
-        return True
-
-
-def dump_yaml(content: Any) -> str:
-    """Return plain values as YAML, in their order, as `parse_yaml` reads it."""
-    return yaml.dump(content, Dumper=_PlainDumper, sort_keys=False, allow_unicode=True, width=120)
-
-
 def parse_yaml(text: str) -> Any:
     """Return the plain values in a text; one of `PARSE_ERRORS` is raised if it is no YAML, or too much of it."""
     if len(text) > MAX_CHARACTERS:
         raise ValueError(f'it has {len(text)} characters; {MAX_CHARACTERS} are allowed')
     return yaml.load(text, _PlainLoader)
+
+
+class _PlainDumper(yaml.SafeDumper):
+    """Writes no aliases, as none are read."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+def yaml_text(content: Any) -> str:
+    """Return plain values as YAML that `parse_yaml` reads."""
+    return str(yaml.dump(content, Dumper=_PlainDumper, sort_keys=False, allow_unicode=True, width=120))
 
 
 def load_json(path: Path, most_bytes: int) -> Any:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from texture_core.config import dump_yaml, library, writing
+from texture_core.config import library, writing, yaml_text
 from texture_core.types import AnyArray, Array
 from texture_estimation.learners.learner import Codes, log_softmax, standardisation
 from texture_estimation.recipe import Recipe
@@ -289,7 +289,7 @@ class Tuned:
 
     def write(self, path: Path) -> Path:
         """Write the recipe as a file that `texture train` reads, the size of the search at its top; return its path."""
-        text = dump_yaml(self.recipe.as_mapping())
+        text = yaml_text(self.recipe.as_mapping())
         with writing(path):
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from texture_core.config import dump_yaml, library, writing
+from texture_core.config import library, writing, yaml_text
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.types import AnyArray
 from texture_recordings.dataset import SlideDataset
@@ -42,8 +42,7 @@ def export_slides(dataset: SlideDataset, out: str | Path) -> list[str]:
         folder.mkdir(parents=True)
         for topic, samples in streams.items():
             write_parquet(samples, folder / f'{topic}.parquet')
-            text = dump_yaml(_mapping(topic, samples))
-            (folder / f'{topic}.yaml').write_text(text, encoding='utf-8')
+            (folder / f'{topic}.yaml').write_text(yaml_text(_mapping(topic, samples)), encoding='utf-8')
             surfaces = len({one.surface for one in samples})
             lines.append(
                 f"{len(samples)} slides over {surfaces} surfaces in '{folder / topic}.parquet'; "

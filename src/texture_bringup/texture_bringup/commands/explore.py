@@ -370,7 +370,7 @@ def unfinished_bags() -> Iterator[None]:
         BAGS_LOG.disabled = False
 
 
-class BagRecorder(Child):
+class RecorderProcess(Child):
     """Record a bag in a separate process, which reports in its log what is on the disk."""
 
     def __init__(self, bag: Path, namespace: str, log: Path) -> None:
@@ -398,9 +398,9 @@ class BagRecorder(Child):
 
 
 @contextmanager
-def recorder(operator: Operator, bag: Path, namespace: str) -> Iterator[BagRecorder]:
+def recorder(operator: Operator, bag: Path, namespace: str) -> Iterator[RecorderProcess]:
     """Record a bag, once it holds what the nodes send."""
-    with tempfile.TemporaryDirectory() as log, BagRecorder(bag, namespace, Path(log) / 'record.log') as recording:
+    with tempfile.TemporaryDirectory() as log, RecorderProcess(bag, namespace, Path(log) / 'record.log') as recording:
         operator.wait_until(
             lambda: records(bag, recording.check),
             RECORDER_S,
