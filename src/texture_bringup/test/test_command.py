@@ -109,13 +109,16 @@ SERVICES = ['stop', 'recover', 'lift', 'touch-surface', 'forget-touches', 'tare'
 @pytest.mark.parametrize(('name', 'success'), [*((name, True) for name in SERVICES), ('stop', False)])
 def test_a_command_calls_its_service_and_ends_with_its_success(name, success, monkeypatch, capsys):
     operator = MagicMock()
-    call = operator.return_value.__enter__.return_value.call
+    entered = operator.return_value.__enter__.return_value
+    call = entered.stop if name == 'stop' else entered.call
     call.return_value = success, 'as it is'
     monkeypatch.setattr('texture_bringup.commands.services.Operator', operator)
     assert main([name, '--namespace', 'left']) == (0 if success else 1)
     assert capsys.readouterr().out == 'as it is\n'
     operator.assert_called_once_with('left')
-    assert call.call_args.args[0] == f'{NODES.get(name, "explorer")}/{name.replace("-", "_")}'
+    assert call.call_args.args[:1] == (
+        () if name == 'stop' else (f'{NODES.get(name, "explorer")}/{name.replace("-", "_")}',)
+    )
 
 
 @pytest.mark.realtime

@@ -99,7 +99,7 @@ def test_the_security_policy_allows_all_that_the_nodes_use_and_nothing_moves_whe
     names = {name.removeprefix('/left') for name in used}
     assert {'/signal', '/explore', '/explore/_action/send_goal', '/roughness_features'} <= names
     assert [name for name in names if not any(fnmatch(name, pattern) for pattern in allowed)] == []
-    assert operator.stop() == 'no exploration is running; earlier requests are cancelled'
+    assert operator.stop() == (True, 'no exploration is running; earlier requests are cancelled')
     operators = policy.find("enclaves/enclave[@path='/tactile_texture/operator']")
     called = {item.text for item in operators.iter('service')}
     # What `texture activate` calls.

@@ -319,11 +319,12 @@ class Operator:
         self.wait_until(over, FEATURES_DEADLINE_S, "the features of the slide do not arrive on 'features'")
         return explored, [one for one in vectors if one.exploration_id == explored.exploration_id and not one.last]
 
-    def stop(self) -> str:
-        """Stop any motion; return the message of the explorer."""
-        missing = f'no explorer offers a stop; start one, or give its --namespace, and {EMERGENCY}'
+    def stop(self) -> tuple[bool, str]:
+        """Stop any motion; return whether the explorer did, and its message."""
+        name = self._node.resolve_service_name('explorer/stop')
+        missing = f"no node offers the service '{name}'; no explorer runs there; {EMERGENCY}"
         answer = self._ask(Trigger, 'explorer/stop', Trigger.Request(), missing, NOT_STOPPED, answer_s=STOP_S)
-        return str(answer.message)
+        return bool(answer.success), str(answer.message)
 
     def call(self, service: str, advice: str) -> tuple[bool, str]:
         """Call a `Trigger`; return whether it succeeded, and its message; `advice` is for a missing service."""

@@ -21,8 +21,9 @@ TOUCHES_MISSING = "the launch files 'ur' and 'ros_controllers' offer it; start o
 
 def _stop(options: argparse.Namespace) -> int:
     with Operator(options.namespace) as operator:
-        print(operator.stop())
-    return 0
+        success, message = operator.stop()
+    print(message)
+    return 0 if success else 1
 
 
 def trigger(summary: str, service: str, advice: str = EXPLORER_MISSING) -> Command:
