@@ -3,6 +3,7 @@
 """What a collection asks of the explorer, and which bag it leaves, without a robot."""
 
 from contextlib import contextmanager
+from pathlib import Path
 from unittest.mock import MagicMock, Mock
 
 import pytest
@@ -13,6 +14,7 @@ from texture_bringup.operator import ExplorationResult
 from texture_core.errors import CollectionError, ExplorationError, InvalidData, InvalidParameter, LaunchFailed
 from texture_core.types import RoughnessEstimate, TextureEstimate
 from texture_evaluation.collection import CollectionEnd, CollectionParams, PlaceAccuracy
+from texture_recordings.bags import BagWriter, read_bag
 
 pytestmark = pytest.mark.ros
 EXPLORER = {
@@ -88,6 +90,19 @@ def test_a_bag_without_any_slide_is_removed_and_the_sentence_says_so(collected, 
     assert bag == (tmp_path / 'cork-2' if kept else None)
     assert sorted(one.name for one in tmp_path.iterdir()) == (['cork', 'cork-2'] if kept else ['cork'])
     assert end.message.endswith('; no slide was made, so no bag is kept') != kept
+
+
+def test_touches_begin_when_the_recorder_writes_what_the_nodes_send(two_surfaces: Path, tmp_path: Path) -> None:
+    [recorded, _] = sorted((two_surfaces / 'bags').iterdir())
+    streams = {name: value for name, _, value in read_bag(recorded, explore.RECORDED)}
+    bag = tmp_path / 'cork'
+    assert not explore.records(bag, lambda: None)
+    writer = BagWriter(bag)
+    for name, complete in (('signal', False), ('exploration', True)):
+        writer.write(f'/left/{name}', streams[name], 1)
+        writer.flush()
+        assert explore.records(bag, lambda: None) == complete
+    writer.close()
 
 
 DONE = ExplorationError.NONE, 'id'

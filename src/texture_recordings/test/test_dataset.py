@@ -85,6 +85,17 @@ def test_an_empty_bag_among_others_is_named_and_skipped(tmp_path: Path, caplog: 
         find_slides([tmp_path / 'cork-2'])
 
 
+@pytest.mark.parametrize('surfaces', [[], ['cork', 'felt']])
+def test_bags_of_explorations_that_were_refused_or_aborted_before_their_slide_are_named_so(
+    tmp_path: Path, surfaces: list[str]
+) -> None:
+    bag = write(tmp_path / 'aborted', surfaces, start_s=0, phases=(Phase.APPROACH, Phase.ABORTED))
+    with BagWriter(bag.with_name('idle')) as idle:
+        idle.write('exploration', ExplorationState(1, '', '', Phase.IDLE), 1)
+    with pytest.raises(InvalidData, match=r"came to its slide: .* ends with 'the motion was completed'"):
+        find_slides([bag.with_name('idle'), *([bag] if surfaces else [])])
+
+
 def test_slides_that_no_surface_has_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InvalidData, match='there are 1 to 2'):
         find_slides([write(tmp_path / 'bag', ['cork', 'cork'], start_s=0)], '30-40')
