@@ -95,7 +95,7 @@ def guard_of(explorer):
 def test_another_commander_ends_the_slide_with_the_finger_lifted_and_then_keeps_the_arm_from_being_taken(
     graph, controller, make_explorer
 ):
-    explorer = make_explorer(replace(PATIENT, connect_timeout_s=5.0))
+    explorer = make_explorer(replace(PATIENT, connect_timeout_s=10.0))
     explorer.connect()
     others = []
     try:
@@ -115,7 +115,7 @@ def test_another_commander_ends_the_slide_with_the_finger_lifted_and_then_keeps_
 
 def test_a_second_explorer_is_refused_and_does_not_disturb_the_first(controller, make_explorer):
     first = make_explorer()
-    second = RosControllersArm(replace(PATIENT, connect_timeout_s=5.0))
+    second = RosControllersArm(replace(PATIENT, connect_timeout_s=10.0))
     with ThreadPoolExecutor() as pool:
         first.connect()
         refused = []
