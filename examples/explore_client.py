@@ -56,10 +56,10 @@ class TextureClient(Node):
         """Abort this exploration; the finger is lifted."""
         self._goal.cancel_goal_async()
 
-    def stop(self) -> None:
-        """Abort any exploration, whoever requested it; the finger is lifted."""
+    def stop(self) -> rclpy.task.Future:
+        """Abort any exploration and lift the finger; what is requested before the answer is cancelled, too."""
         self._stop.wait_for_service()
-        self._stop.call_async(Trigger.Request())
+        return self._stop.call_async(Trigger.Request())
 
     def result(self) -> ExplorationResult:
         """Return the result of the exploration."""

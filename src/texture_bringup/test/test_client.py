@@ -57,9 +57,10 @@ def explore(graph, client, world, meanwhile=lambda: None, **request):
     """Return the result of an exploration and the status of its goal; `meanwhile` is called in its slide."""
     client.start(**request)
     graph.until(lambda: client.is_complete() or world.phase == SLIDE)
-    if not client.is_complete():
-        meanwhile()
+    answer = None if client.is_complete() else meanwhile()
     graph.until(client.is_complete)
+    if answer:  # a stop also cancels what is requested before its answer
+        graph.until(lambda: client.is_complete() and answer.done())
     return client.result(), client._ending.result().status
 
 
