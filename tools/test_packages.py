@@ -30,7 +30,6 @@ KEYS = {
     'hypothesis': 'python3-hypothesis',
     'joblib': 'python3-joblib',
     'matplotlib': 'python3-matplotlib',
-    'PIL': 'python3-pil',
     'numpy': 'python3-numpy',
     'pytest': 'python3-pytest',
     'rich': 'python3-rich',

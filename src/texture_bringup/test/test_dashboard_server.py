@@ -213,6 +213,17 @@ def test_many_guesses_at_once_are_not_checked_nor_what_follows(address) -> None:
     with_client(story, Access('0.0.0.0', TOKEN, ('robot',)))
 
 
+def answered(access: Access, sent: bytes) -> bytes:
+    """Return all that a server answers to these bytes until it closes the connection."""
+    serving = Serving(make_app(Nodes(), access, PAGE), '127.0.0.1', 0)
+    try:
+        with socket.create_connection(('127.0.0.1', serving.port), timeout=DEADLINE_S) as line:
+            line.sendall(sent)
+            return b''.join(iter(lambda: line.recv(4096), b''))
+    finally:
+        serving.close()
+
+
 @pytest.mark.parametrize(
     ('sent', 'answer'),
     [
@@ -226,26 +237,14 @@ def test_many_guesses_at_once_are_not_checked_nor_what_follows(address) -> None:
 def test_a_connection_whose_request_does_not_come_to_its_end_is_closed(sent, answer, monkeypatch) -> None:
     monkeypatch.setattr(dashboard, 'REQUEST_S', 0.2)
     monkeypatch.setattr(dashboard, 'LOOK_S', 0.05)
-    serving = Serving(make_app(Nodes(), Access('127.0.0.1'), PAGE), '127.0.0.1', 0)
-    try:
-        with socket.create_connection(('127.0.0.1', serving.port), timeout=DEADLINE_S) as line:
-            line.sendall(sent)
-            received = b''.join(iter(lambda: line.recv(4096), b''))
-    finally:
-        serving.close()
+    received = answered(Access('127.0.0.1'), sent)
     assert received.partition(b'\r\n')[0] == answer
 
 
 def test_a_token_that_is_no_text_is_a_wrong_one_and_is_counted() -> None:
-    serving = Serving(make_app(Nodes(), Access('0.0.0.0', TOKEN, ('robot',)), PAGE), '127.0.0.1', 0)
     asked = b''.join(b'GET / HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer \xff%d\r\n' % i for i in range(7))
     asked = asked.replace(b'GET', b'\r\nGET').removeprefix(b'\r\n') + b'Connection: close\r\n\r\n'
-    try:
-        with socket.create_connection(('127.0.0.1', serving.port), timeout=DEADLINE_S) as line:
-            line.sendall(asked)
-            answers = b''.join(iter(lambda: line.recv(4096), b''))
-    finally:
-        serving.close()
+    answers = answered(Access('0.0.0.0', TOKEN, ('robot',)), asked)
     assert re.findall(rb'HTTP/1.1 (\d+)', answers) == [b'401'] * 6 + [b'429']
 
 

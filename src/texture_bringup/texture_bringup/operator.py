@@ -321,17 +321,17 @@ class Operator:
 
     def stop(self) -> tuple[bool, str]:
         """Stop any motion; return whether the explorer did, and its message."""
-        name = self._node.resolve_service_name('explorer/stop')
-        missing = f"no node offers the service '{name}'; no explorer runs there; {EMERGENCY}"
-        answer = self._ask(Trigger, 'explorer/stop', Trigger.Request(), missing, NOT_STOPPED, answer_s=STOP_S)
-        return bool(answer.success), str(answer.message)
+        return self.call('explorer/stop', f'no explorer runs there; {EMERGENCY}', NOT_STOPPED, STOP_S)
 
-    def call(self, service: str, advice: str) -> tuple[bool, str]:
-        """Call a `Trigger`; return whether it succeeded, and its message; `advice` is for a missing service."""
+    def call(self, service: str, advice: str, silent: str = '', answer_s: float = ANSWER_S) -> tuple[bool, str]:
+        """Call a `Trigger`; return whether it succeeded, and its message.
+
+        `advice` is for a missing service, `silent` the sentence for one that gives no answer.
+        """
         name = f"the service '{self._node.resolve_service_name(service)}'"
         missing = f'no node offers {name}; {advice}'
-        silent = f'{name} does not answer; look at the robot, and at the output of its node'
-        answer = self._ask(Trigger, service, Trigger.Request(), missing, silent)
+        silent = silent or f'{name} does not answer; look at the robot, and at the output of its node'
+        answer = self._ask(Trigger, service, Trigger.Request(), missing, silent, answer_s=answer_s)
         return bool(answer.success), str(answer.message)
 
     def set_active(self, node: str, active: bool) -> str:

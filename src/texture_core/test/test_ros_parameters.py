@@ -99,7 +99,7 @@ def start(*words: str) -> None:
     run(n, ['--ros-args', *words])
 
 
-def said(capfd: Any, *words: str) -> str:
+def error_line(capfd: Any, *words: str) -> str:
     with pytest.raises(SystemExit) as ended:
         start(*words)
     assert ended.value.code == 2
@@ -121,8 +121,8 @@ def test_the_last_file_counts_whatever_its_section_and_however_the_number_is_wri
 ) -> None:
     preset = write(tmp_path / 'preset.yaml', PRESET)
     robot = write(tmp_path / 'robot.yaml', f'{section}:\n  ros__parameters: {{length_s: {value}}}\n')
-    assert 'length_s=3.0' in said(capfd, *preset, *robot)
-    assert 'length_s=2.0' in said(capfd, *preset, *robot, '-p', 'length_s:=2')
+    assert 'length_s=3.0' in error_line(capfd, *preset, *robot)
+    assert 'length_s=2.0' in error_line(capfd, *preset, *robot, '-p', 'length_s:=2')
 
 
 @pytest.mark.parametrize('value', ['8.0N', '"8.0"', 'true', '6,5'])
@@ -130,7 +130,7 @@ def test_a_mistyped_value_is_refused_in_any_order_of_files(tmp_path: Path, capfd
     preset = write(tmp_path / 'preset.yaml', PRESET)
     robot = write(tmp_path / 'robot.yaml', f'/**/n:\n  ros__parameters:\n    length_s: {value}\n')
     for words in ((*preset, *robot), (*robot, *preset)):
-        line = said(capfd, *words)
+        line = error_line(capfd, *words)
         assert f"{robot[1]}': parameter 'length_s' is " in line
         assert 'a number is needed, 0.01 to 10.0 s' in line
 
@@ -138,7 +138,7 @@ def test_a_mistyped_value_is_refused_in_any_order_of_files(tmp_path: Path, capfd
 @pytest.mark.parametrize('text', ['n:\n  length_s: 8.0\n', 'n:\n  ros__parameters:\n\tlength_s: 8.0\n', 'length_s\n'])
 def test_a_file_with_a_wrong_layout_is_refused_in_one_sentence(tmp_path: Path, capfd: Any, text: str) -> None:
     words = write(tmp_path / 'robot.yaml', text)
-    line = said(capfd, *words)
+    line = error_line(capfd, *words)
     assert words[1] in line
     assert "below it 'ros__parameters:'" in line
     with pytest.raises(InvalidParameter, match=r"robot\.yaml.*below it 'ros__parameters:'"):

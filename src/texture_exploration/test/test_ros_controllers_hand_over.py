@@ -120,7 +120,7 @@ def test_a_guard_whose_explorer_has_ended_commands_zero_until_the_pose_shows_res
 
 
 @pytest.mark.parametrize(('sent', 'zeros_sent'), [(b'm', True), (b'r', False), (b'', False), (b'7', True)])
-def test_only_an_arm_that_is_said_to_rest_needs_no_zero_velocity_when_nobody_speaks_for_it(sent, zeros_sent):
+def test_only_an_arm_reported_at_rest_needs_no_zero_velocity_when_its_heartbeat_is_lost(sent, zeros_sent):
     ours, line = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     zeros = []
 
