@@ -241,6 +241,26 @@ def test_an_archive_that_unpacks_to_more_than_a_gigabyte_is_refused() -> None:
         Archive(io.BytesIO(lying))
 
 
+def test_an_archive_of_a_million_empty_members_is_refused_before_they_are_listed() -> None:
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, 'w') as archive:
+        archive.writestr('a', b'')
+    content = file.getvalue()
+    begin, end = content.index(b'PK\x01\x02'), content.index(b'PK\x05\x06')
+    entry, record = content[begin:end], content[end:]
+    directory = entry * 1_000_000
+    lying = content[:begin] + directory + record[:12] + len(directory).to_bytes(4, 'little') + record[16:]
+    locator = b'PK\x06\x07' + bytes(16)  # of the larger form of the record
+    tracemalloc.start()
+    try:
+        for made in (lying, content[:end] + locator + record):
+            with pytest.raises(FileRefused, match='its list of members has more than 10 MB'):
+                Archive(io.BytesIO(made))
+        assert tracemalloc.get_traced_memory()[1] < 100_000_000
+    finally:
+        tracemalloc.stop()
+
+
 def test_no_more_of_a_member_is_unpacked_than_the_directory_states() -> None:
     file = io.BytesIO()
     with zipfile.ZipFile(file, 'w', zipfile.ZIP_DEFLATED) as archive:

@@ -194,6 +194,8 @@ def executable(package: str, name: str) -> Path:
 
 MB = 1_000_000
 MAX_FILE_BYTES = 1000 * MB
+MAX_DIRECTORY_BYTES = 10 * MB  # of a zip file: some 100 000 members
+ZIP_END_BYTES = 22 + 65_535  # its last record, and a comment
 LAST_CHARACTER = 0x10FFFF  # of Unicode; NumPy keeps 32 bits for each and compares none
 # What zipfile and NumPy raise at content that is damaged, cut off or claims more than there is.
 BROKEN_CONTENT = (
@@ -271,6 +273,7 @@ class Archive:
     """
 
     def __init__(self, file: IO[bytes], most_bytes: int = MAX_FILE_BYTES) -> None:
+        _check_directory(file)
         try:
             self._zip = zipfile.ZipFile(file)
         except BROKEN_CONTENT as error:
@@ -304,6 +307,18 @@ class Archive:
     def array(self, name: str) -> AnyArray:
         """Return the array in a member, see `read_array`; KeyError if there is no such member."""
         return read_array(io.BytesIO(self.read(name)))
+
+
+def _check_directory(file: IO[bytes]) -> None:
+    """Refuse a zip file whose directory would fill the memory: zipfile reads all of it, whatever it claims to list."""
+    size = file.seek(0, os.SEEK_END)
+    file.seek(max(0, size - ZIP_END_BYTES))
+    end = file.read()
+    before, found, record = end.rpartition(b'PK\x05\x06')
+    directory_bytes = int.from_bytes(record[8:12], 'little') if found else 0
+    # The larger form of the record is for archives beyond 4 GB or 65 535 members.
+    if directory_bytes > MAX_DIRECTORY_BYTES or before[-20:-16] == b'PK\x06\x07':
+        raise FileRefused(f'its list of members has more than {MAX_DIRECTORY_BYTES // MB} MB; save fewer arrays in it')
 
 
 class Arrays:

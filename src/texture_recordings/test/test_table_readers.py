@@ -4,6 +4,7 @@
 
 import os
 import sys
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 
@@ -114,6 +115,27 @@ def test_a_column_that_is_missing_is_refused_with_the_nearest(tmp_path: Path, su
     with pytest.raises(UnknownName, match="no column 'wrong'"):
         chosen(['wrong'], names)
     assert chosen(['*'], names) == names
+
+
+def test_texts_that_all_refer_to_one_long_text_take_bounded_memory(tmp_path):
+    path, long = tmp_path / 'cork.h5', 'c' * 4_000_000
+    with h5py.File(path, 'w') as file:
+        file['x'] = X
+        texts = file.create_dataset('m', (len(X),), h5py.string_dtype(), fillvalue='')
+        texts[0] = long
+        begin = texts.id.get_offset()
+    content = bytearray(path.read_bytes())
+    content[begin : begin + 16 * len(X)] = content[begin : begin + 16] * len(X)  # length and address of the first
+    path.write_bytes(content)
+    tracemalloc.start()
+    try:
+        [frame] = frames(
+            path, 'cork.h5', mapping(label={'column': 'm'}, streams={'signal': {'columns': ['x'], 'rate_hz': 100.0}})
+        )
+        assert tracemalloc.get_traced_memory()[1] < 200_000_000
+    finally:
+        tracemalloc.stop()
+    assert set(frame['m']) == {'c' * 200}
 
 
 @pytest.mark.parametrize(('suffix', 'name'), [('.h5', 'h5py'), ('.parquet', 'pyarrow.parquet')])

@@ -9,6 +9,7 @@ import dataclasses
 import fnmatch
 import io
 import math
+import os
 import re
 import struct
 import warnings
@@ -35,6 +36,7 @@ MAX_RANGE = 10_000
 TRIAL = 'trial'  # number of the first axis of arrays (n_trials, n_samples, n_channels)
 MAX_ARRAYS = 50_000  # data sets of an HDF5 file
 MAX_CHANNELS = 10_000  # more are samples: the array lies on its side
+MAX_TEXT_BYTES = 64 * MB  # read at once from an HDF5 file
 MAX_TEXT = 200  # characters of a cell that is shown or a label
 
 Take = Callable[[float], None]  # asks for a number of values; InvalidData beyond the limit of the file
@@ -433,13 +435,28 @@ def _read_hdf5(
             if matlab and member.attrs.get('MATLAB_class') == b'char':
                 return np.array(''.join(map(chr, np.asarray(member[()]).ravel().tolist())))
             if texts:
-                cells = np.asarray(member.asstr(errors='replace')[()], dtype=object)
-                return np.array([text[:MAX_TEXT] for text in cells.ravel()], dtype=object).reshape(cells.shape)
+                return _read_texts(member, max(1, MAX_TEXT_BYTES // os.fstat(opened.fileno()).st_size))
             _refuse_hidden(member, f"data set '{name}'")
             array = np.asarray(member[()])
             return array.T if matlab else array
 
         yield from _frames(list(found), load, place, mapping, lambda _: None)
+
+
+def _read_texts(member: Any, step: int) -> AnyArray:
+    """Return the texts of a data set, of each its beginning, read `step` at a time.
+
+    Many of them may refer to one text as long as the file: all at once would have no limit.
+    """
+    texts, cells = member.asstr(errors='replace'), np.empty(member.shape, dtype=object)
+    if not member.shape:
+        cells[()] = texts[()][:MAX_TEXT]
+        return cells
+    for row in np.ndindex(member.shape[:-1]):
+        for begin in range(0, member.shape[-1], step):
+            part = (*row, slice(begin, begin + step))
+            cells[part] = [text[:MAX_TEXT] for text in texts[part]]
+    return cells
 
 
 def _refuse_hidden(member: Any, where: str) -> None:
