@@ -13,6 +13,8 @@ os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 from texture_bringup.command import main
 from texture_bringup.launcher import ChildLauncher
 from texture_bringup.operator import Operator
+from texture_core.errors import ExplorationError, MotionRefused
+from texture_core.types import ExplorationRequest
 from texture_evaluation.train import train_from_bags
 from texture_recordings.dataset import SlideDataset
 
@@ -69,6 +71,18 @@ def test_a_surface_is_collected_at_places_that_training_can_leave_out(operator, 
     assert main(['collect', 'suede', str(bags), *QUICK]) == 2
     assert 'no surface patch is taught: touch the corners' in capsys.readouterr().err
     operator.set_parameters('explorer', {'patch_x_high_m': 0.05})
+
+
+def test_a_stop_between_two_slides_ends_the_series(operator, folder):
+    request = ExplorationRequest('linear_slide', distance_m=0.03)
+    stopped = operator.watch_stops()
+    assert operator.explore(request, stopped=stopped).success
+    with Operator('', DOMAIN) as other:
+        assert other.stop()[0]
+    with pytest.raises(MotionRefused) as refused:
+        operator.explore(request, stopped=stopped)
+    assert refused.value.error is ExplorationError.STOPPED
+    assert operator.explore(request, stopped=operator.watch_stops()).success  # of another series
 
 
 def test_the_finger_is_checked_by_a_slide_over_the_plate(operator, folder, capsys):

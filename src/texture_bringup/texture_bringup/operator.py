@@ -8,6 +8,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 from uuid import uuid4
 
@@ -109,8 +110,8 @@ FEATURES_DEADLINE_S = 30.0
 GONE_S = 4.0
 # Time until a goal is accepted: it is short, unless the request has been lost with an explorer that just died.
 ACCEPT_S, CONFIRM_S = 15.0, 1.0
-# Time to find a service, and time for its answer: an arm needs seconds to recover, a tare up to 65 s.
-OFFERED_S, ANSWER_S = 10.0, 75.0
+# Time to find a service, and time for its answer: a tare takes up to 65 s, an arm up to 96 s to connect again.
+OFFERED_S, ANSWER_S = 10.0, 120.0
 STOP_S = 3.0
 EMERGENCY = 'if the arm moves, use the emergency stop of the robot'
 NOT_STOPPED = f'the explorer has not answered the stop within {STOP_S:g} s; {EMERGENCY}'
@@ -234,6 +235,22 @@ class Operator:
         self.wait_until(all_listen, LISTENERS_DEADLINE_S, f'no node subscribes to {", ".join(topics)} yet')
         self._settle()
 
+    def watch_stops(self) -> Callable[[], bool]:
+        """Return what says whether the explorer is told to stop from now on, between explorations, too."""
+        ends: list[int] = []
+        quality = quality_of_service('explorer_info')
+        self._node.create_subscription(
+            msg.ExplorerInfo, 'explorer_info', lambda info: ends.append(info.last_error_code), quality
+        )
+
+        def stopped() -> bool:
+            end_s = time.monotonic() + STEP_S
+            while time.monotonic() < end_s:  # a caller who waited for something else has not heard it yet
+                self._step()
+            return any(end == ExplorationError.STOPPED != before for before, end in pairwise(ends))
+
+        return stopped
+
     def explore(
         self,
         request: ExplorationRequest,
@@ -304,12 +321,15 @@ class Operator:
         )
 
     def explore_with_features(
-        self, request: ExplorationRequest, on_progress: Progress = lambda _state, _texture: None
+        self,
+        request: ExplorationRequest,
+        on_progress: Progress = lambda _state, _texture: None,
+        stopped: Callable[[], bool] = lambda: False,
     ) -> tuple[ExplorationResult, list[FeatureVector]]:
         """Explore as `explore` does, and also return the features of the windows; none of an aborted exploration."""
         vectors = self._listen_to_features()
         vectors.clear()
-        explored = self.explore(request, on_progress)
+        explored = self.explore(request, on_progress, stopped)
         if not explored.success:
             return explored, []
 

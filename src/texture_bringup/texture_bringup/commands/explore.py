@@ -107,8 +107,9 @@ def _explore(options: argparse.Namespace) -> int:
     try:
         with Operator(options.namespace) as operator:
             operator.wait_for_explorer(EXPLORER_S, SOON_S)
+            explore = partial(operator.explore, stopped=operator.watch_stops())
             for request in requests:
-                result = explored(operator.explore, request)
+                result = explored(explore, request)
                 if options.json:
                     print(json.dumps(as_json(result)), flush=True)
                 else:
@@ -247,6 +248,7 @@ def _identify(options: argparse.Namespace) -> int:
     belief, number = known.uniform_log_prior, 0
     with Operator(options.namespace) as operator:
         operator.wait_for_explorer(EXPLORER_S, SOON_S)
+        explore = partial(operator.explore_with_features, stopped=operator.watch_stops())
         while number < options.most and np.exp(belief.max()) < options.sure:
             number += 1
             motion, information = known.best_motion(belief, known.motions)
@@ -262,7 +264,7 @@ def _identify(options: argparse.Namespace) -> int:
                 distance_m=motion.speed_m_s * motion.duration_s,
                 direction_rad=motion.direction_rad,
             )
-            result, vectors = explored(operator.explore_with_features, request)
+            result, vectors = explored(explore, request)
             if not result.success:
                 return int(not print_result(result))
             belief = known.update(belief, motion, slide_values(vectors, model.feature_set))
@@ -310,12 +312,13 @@ def collect_surface(
     end = collection.CollectionEnd(CollectionError.CANCELLED, 'stopped', 0)  # by Ctrl-C while the recorder starts
     try:
         with suppress(KeyboardInterrupt), recorder(operator, bag, namespace) as recording:
+            stopped = operator.watch_stops()
 
             def explore(request: ExplorationRequest) -> tuple[ExplorationError, str]:
                 nonlocal made, losses
                 recording.check()
                 try:
-                    explored = operator.explore(request)
+                    explored = operator.explore(request, stopped=stopped)
                 except (MotionRefused, MotionAborted) as error:
                     return error.error, str(error)
                 if explored.success:
@@ -541,8 +544,9 @@ def slide_over_plate(bag: Path, request: ExplorationRequest, namespace: str, cou
     with Operator(namespace) as operator:
         operator.wait_for_explorer(EXPLORER_S, SOON_S)
         with recorder(operator, bag, namespace):
+            stopped = operator.watch_stops()
             for _ in range(count):
-                explored = operator.explore(request)
+                explored = operator.explore(request, stopped=stopped)
                 if not explored.success:
                     raise MotionAborted(f'the slide over the plate failed: {explored.message}')
 

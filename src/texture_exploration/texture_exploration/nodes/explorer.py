@@ -370,6 +370,8 @@ class ExplorerNode(PatientLifecycleNode):
 
     def _stop(self) -> str:
         message = self._explorer.stop('stopped on request', STOP_COVERS_S)
+        self._last_error = ExplorationError.STOPPED  # also for those who are between two explorations
+        self._publish_info()
         time.sleep(STOP_COVERS_S)  # what is requested after the answer is not covered
         return message
 
