@@ -6,6 +6,7 @@ They hold and slide; whatever ends the command of motors ends their torque, and 
 """
 
 import contextlib
+import itertools
 import math
 import os
 import re
@@ -330,6 +331,33 @@ def test_the_guard_sends_what_the_sdk_would_send(tmp_path):
         line.close()
     os.close(slave)
     os.close(master)
+
+
+def test_a_late_cycle_is_made_good_without_a_jerk(bus, hand, monkeypatch):
+    """One cycle in twenty is 40 ms late; goals advance by at most 1.25 times the speed, and by the whole way."""
+    hand.connect()
+    read, write, cycles, goals = DynamixelBus.read, DynamixelBus.write_goals, itertools.count(), []
+    along = LEAP.fingers['index']['along']
+
+    def late(self):
+        if next(cycles) % 20 == 0:
+            time.sleep(0.04)
+        return read(self)
+
+    def noted(self, asked):
+        goals.append(asked[along.id][1] * along.lever_m)
+        write(self, asked)
+
+    monkeypatch.setattr(DynamixelBus, 'read', late)
+    monkeypatch.setattr(DynamixelBus, 'write_goals', noted)
+    speed_m_s, begin_s = 0.01, time.monotonic()
+    while time.monotonic() < begin_s + 1.0:
+        hand.command(ArmCommand(tangential_m_s=(0.0, speed_m_s)))
+        time.sleep(0.02)
+    took_s = time.monotonic() - begin_s
+    steps = np.diff(goals)
+    assert steps.max() <= 1.25 * speed_m_s / LEAP.rate_hz * 1.001
+    assert goals[-1] - goals[0] == pytest.approx(speed_m_s * took_s, abs=0.1 * speed_m_s)
 
 
 def test_a_hand_refuses_what_exceeds_its_limits_and_goes_on(bus, hand):

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from contextlib import closing
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -83,6 +84,20 @@ def test_an_overload_lifts_the_finger_and_is_a_fault_until_cleared(rails, arm):
     rails.firmware.surface_m = 0.0
     arm.connect()
     until(lambda: arm.state().fault == '')
+
+
+def test_places_have_the_time_of_the_rails_however_late_they_are_read(rails, arm):
+    states = []
+    while len(states) < 30:
+        arm.command(SLIDING)
+        time.sleep(0.03)  # with 2 to 4 states in between
+        states.append(arm.state())
+    steady = states[10:]
+    speeds = [
+        (after.position[0] - before.position[0]) / (after.place_ns - before.place_ns) * 1e9
+        for before, after in pairwise(steady)
+    ]
+    assert speeds == pytest.approx([0.02] * len(speeds), rel=0.05)
 
 
 def test_a_process_that_is_killed_leaves_the_rails_at_rest_and_to_the_next(rails):

@@ -31,7 +31,7 @@ from texture_exploration.arms.hand import POSITION_RAD, VELOCITY_RAD_S, X_SERIES
 LINE_FAULTS = (serial.SerialException, OSError, termios.error, TypeError, AttributeError)
 PROTOCOL = 2.0
 SUCCESS = 0
-TRIES = 3
+TRIES, REGISTER_TRIES = 3, 6  # of a motor in the loop, of one register: a busy machine hears some answers too late
 WAIT_S = 0.001
 # A status packet: `FF FF FD 00 | id | length | 55 | error | parameters | CRC`; its length counts from the 55 on.
 PACKET_ID, PACKET_LENGTH, PACKET_PARAMETERS = 4, 5, 9
@@ -305,7 +305,7 @@ class DynamixelBus:
         """Write one register, and check that it was accepted."""
         address, size = X_SERIES[register]
         send = {1: 'write1ByteTxRx', 2: 'write2ByteTxRx', 4: 'write4ByteTxRx'}[size]
-        for _ in range(TRIES):
+        for _ in range(REGISTER_TRIES):
             with self._line():
                 result, error = getattr(self._packets, send)(self._port, motor, address, value % (1 << 8 * size))
             if result == SUCCESS:
@@ -321,7 +321,7 @@ class DynamixelBus:
     def read_register(self, motor: int, register: str) -> int | None:
         """Return one register, signed if it is longer than a byte; None if the motor does not answer."""
         address, size = X_SERIES[register]
-        for _ in range(TRIES):
+        for _ in range(REGISTER_TRIES):
             data, result = self._read_block(motor, address, size)
             if result == SUCCESS:
                 return register_in(data, address, register)

@@ -26,7 +26,7 @@ COMMAND_S = 0.2  # time for which a command holds
 CLOSING_M_S = 0.02  # speed of a finger that comes down to press
 REACH_RAD = 0.3  # largest depth of the goal of a pressing motor within the object
 SLACK_RAD = 0.2  # largest distance between the goal and a blocked motor
-LONGEST_STEP_S = 0.05
+CATCH_UP, LONGEST_LAG_S = 1.25, 0.1  # a finger makes good a late cycle by a speed that is so much higher: no jerk
 NOT_CONNECTED = 'the hand is not connected; connect it first'
 HELD_FRACTION = 0.8  # of the wanted force: a finger that presses with it holds the object
 LOST_FRACTION = 0.5  # one that presses less has lost it
@@ -233,19 +233,22 @@ class InHandArm(Arm):
         for finger in self._fingers.values():
             finger.restart()
         now_s = stepped_s = time.monotonic()
+        lag_s = 0.0  # for which the fingers still have to move
         errors: dict[str, None] = {}
         while not self._closing.wait(max(0.0, now_s + period_s - time.monotonic())):
-            now_s = time.monotonic()
+            now_s, asked_ns = time.monotonic(), time.monotonic_ns()  # motors answer soon, a busy machine reads it late
             motors = bus.read()
             if not motors:
                 if bus.missing and self._fresh.is_set():
-                    self._publish(bus, errors)  # at once: before the others have been read again
+                    self._publish(bus, errors, asked_ns)  # at once: before the others have been read again
                 continue
             if error := bus.check_next():
                 errors[error] = None
-            goals = self._step(motors, min(LONGEST_STEP_S, now_s - stepped_s), now_s)
-            stepped_s = now_s
-            self._publish(bus, errors)
+            lag_s, stepped_s = min(LONGEST_LAG_S, lag_s + now_s - stepped_s), now_s
+            step_s = min(CATCH_UP * period_s, lag_s)
+            lag_s -= step_s
+            goals = self._step(motors, step_s, now_s)
+            self._publish(bus, errors, asked_ns)
             bus.write_goals(goals)
 
     def _step(self, motors: Mapping[int, MotorState], dt_s: float, now_s: float) -> dict[int, tuple[float, float]]:
@@ -259,10 +262,10 @@ class InHandArm(Arm):
             goals.update(finger.goals(commands.get(name, STANDSTILL), dt_s))
         return goals
 
-    def _publish(self, bus: DynamixelBus, errors: Iterable[str]) -> None:
+    def _publish(self, bus: DynamixelBus, errors: Iterable[str], asked_ns: int) -> None:
         fault = '; '.join(dict.fromkeys([*map(bus.why_missing, sorted(bus.missing)), *errors]))
         tips = {name: finger.tip for name, finger in self._fingers.items()}
-        self._state = HandState(time.monotonic_ns(), tips, fault)
+        self._state = HandState(asked_ns, tips, fault)
         self._fresh.set()
 
 

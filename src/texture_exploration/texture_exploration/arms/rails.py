@@ -93,6 +93,7 @@ class RailsArm(Arm):
         self._sending = threading.Lock()
         self._sent = 0
         self._states: deque[tuple[int, Vector]] = deque(maxlen=SPEED_OVER)  # device time in µs, and place
+        self._place_ns = 1  # of the last one, since the first
         self._state: ArmState | None = None
 
     def connect(self) -> None:
@@ -197,6 +198,8 @@ class RailsArm(Arm):
         x, y, z, force_mn, flags, _watchdog_stops = STATE_BODY.unpack(frame.body)
         per_m, params = self._params.xy_counts_m, self._params
         place: Vector = (x / per_m, y / per_m, params.height_m + z / params.z_counts_m)
+        before_us = self._states[-1][0] if self._states else frame.time_us
+        self._place_ns += 1000 * ((frame.time_us - before_us) % (1 << 32))
         self._states.append((frame.time_us, place))
         self._state = ArmState(
             time_ns=time.monotonic_ns(),
@@ -205,6 +208,7 @@ class RailsArm(Arm):
             force_n=force_mn / MILLI,
             fault='; '.join(text for flag, text in FAULTS.items() if flags & flag),
             watchdog_s=WATCHDOG_S,
+            place_ns=self._place_ns,  # by the clock of the rails: a busy machine receives states late, then many
         )
         self._fresh.set()
 

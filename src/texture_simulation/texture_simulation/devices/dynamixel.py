@@ -281,17 +281,18 @@ class EmulatedDynamixelBus(EmulatedSerialRobot):
         """Answer what comes, and let the motors move."""
         due_s = time.monotonic()
         while not self.closing.is_set():
-            with self.port_lock:
-                data = self.port.read()
-                self.port.write(self.receive(data))
-            if not data:
-                self.closing.wait(IDLE_S)
+            # First the time that has passed: a read is answered with the present position, as a motor does.
             steps = int((time.monotonic() - due_s) / PHYSICS_S)
             if steps * PHYSICS_S >= TURN_S:
                 due_s += steps * PHYSICS_S
                 self.motors.advance(min(steps, MAX_STEPS))
                 if self._finger is not None:
                     self.emulator.send(self.motors.finger_state(self._finger, time.monotonic_ns()))
+            with self.port_lock:
+                data = self.port.read()
+                self.port.write(self.receive(data))
+            if not data:
+                self.closing.wait(IDLE_S)
 
     def receive(self, data: bytes) -> bytes:
         """Return the answers to what came over the line."""
