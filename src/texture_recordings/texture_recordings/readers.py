@@ -454,7 +454,7 @@ def _read_texts(member: Any, step: int) -> AnyArray:
         return cells
     for row in np.ndindex(member.shape[:-1]):
         for begin in range(0, member.shape[-1], step):
-            part = (*row, slice(begin, begin + step))
+            part: tuple[Any, ...] = (*row, slice(begin, begin + step))
             cells[part] = [text[:MAX_TEXT] for text in texts[part]]
     return cells
 
