@@ -141,7 +141,9 @@ class Panel:
 def animate(slides: list[Shown], path: Path) -> None:
     """Write the animation: both slides at the same time, then both results."""
     figure, axes = plt.subplots(3, 2, figsize=(6.4, 4.4), height_ratios=(2.4, 1.3, 3), layout='constrained')
-    figure.suptitle(f'simulated TSF-85, windows of {1e3 * WINDOWS["length_s"]:g} ms, slowed {SLOWER:g} times', fontsize=12)
+    figure.suptitle(
+        f'simulated TSF-85, windows of {1e3 * WINDOWS["length_s"]:g} ms, slowed {SLOWER:g} times', fontsize=12
+    )
     titles = (f'{SHOWN[0]}: trained', f'{SHOWN[1]}: never trained')
     panels = [Panel(slide, *column, title) for slide, column, title in zip(slides, axes.T, titles, strict=True)]
     for axis in axes[1:].ravel():

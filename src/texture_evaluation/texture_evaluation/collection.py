@@ -138,7 +138,7 @@ class PlacePlan:
             raise InvalidData(
                 f'no slide of {params.distance_m:g} m with its ramps lies on the patch, which is '
                 f'{patch.x_high_m - patch.x_low_m:g} m by {patch.y_high_m - patch.y_low_m:g} m; ask for shorter '
-                'slides, or touch the corners of a larger one'
+                'slides, or touch a larger patch'
             )
 
     def next(self) -> ExplorationRequest:
