@@ -374,12 +374,18 @@ def catalogue(entries: Mapping[str, Any]) -> Callable[[Path], str]:
     def rows(root: Path) -> Iterator[str]:
         yield from ('| name | what it is |', '|---|---|')
         for name, entry in entries.items():
-            made = getattr(entry, 'func', entry)  # several sensors are a partial of one class
-            about = inspect.cleandoc(made.__doc__ or '').split('\n', 1)[0].replace('|', '\\|')
-            given = ', '.join(f'`{key}={value!r}`' for key, value in getattr(entry, 'keywords', {}).items())
-            yield f'| `{name}` | {about}{f" With {given}." if given else ""} |'
+            about = inspect.cleandoc(entry.__doc__ or '').split('\n', 1)[0].replace('|', '\\|')
+            yield f'| `{name}` | {about} |'
 
     return lambda root: '\n'.join(rows(root)) + '\n'
+
+
+def sensors(root: Path) -> str:
+    """Return a table of the sensors, several of which are one class, from the comments of their catalogue."""
+    text = (root / 'src/texture_drivers/texture_drivers/catalogue.py').read_text(encoding='utf-8')
+    commented = dict(re.findall(r"^    '(\w+)': .*,  # (.+)$", text, re.MULTILINE))
+    rows = ['| name | what it is |', '|---|---|', *(f'| `{name}` | {commented[name]} |' for name in SENSORS)]
+    return '\n'.join(rows) + '\n'
 
 
 def scenes(root: Path) -> str:
@@ -446,7 +452,8 @@ PAGES: Mapping[str, tuple[str, str, Callable[[Path], str]]] = {
     'commands': (
         'Commands',
         'Each is called as `texture NAME`, and has `--help`. It ends with 0 for success, 2 if an argument is wrong or '
-        'something is missing, 1 for a bad outcome, and 130 if Ctrl-C interrupted it.',
+        'something is missing, 1 for a bad outcome, and 130 if Ctrl-C interrupted it; `explore` also with 3 if the '
+        'label is rejected, and 4 if the exploration was aborted.',
         commands,
     ),
     'parameters': (
@@ -461,7 +468,7 @@ PAGES: Mapping[str, tuple[str, str, Callable[[Path], str]]] = {
         'All names that recipes, scenes, requests and parameters may use. Instead of a name write `module:Class` for '
         'a custom one.',
         parts(
-            ('Sensors', 'Values of the parameter `sensor`.', catalogue(SENSORS)),
+            ('Sensors', 'Values of the parameter `sensor`.', sensors),
             ('Adaptors', 'Values of the parameter `mapping` of the node `adaptor`.', adaptors),
             ('Arms', 'Values of the parameter `arm`.', catalogue(ARMS)),
             (

@@ -96,7 +96,7 @@ class Panel:
         signal.set_ylabel('signal', fontsize=12)
         probability.set(xlim=scene.get_xlim(), ylim=(0, 1.04), yticks=[0, 0.5, 1])
         probability.set_xlabel('sliding time (s)', fontsize=12)
-        probability.set_ylabel('probability', fontsize=12)
+        probability.set_ylabel('probability among\ntrained surfaces', fontsize=12)
         colours = dict(zip(shown.labels, COLOURS, strict=False))
         self._lines = {name: probability.plot([], [], color=colours[name], linewidth=2.2)[0] for name in shown.labels}
         style = {'fontsize': 12, 'va': 'center', 'ha': 'right'}
@@ -139,21 +139,23 @@ class Panel:
 
 
 def animate(slides: list[Shown], path: Path) -> None:
-    """Write the animation: one slide after the other, then both results."""
+    """Write the animation: both slides at the same time, then both results."""
     figure, axes = plt.subplots(3, 2, figsize=(6.4, 4.4), height_ratios=(2.4, 1.3, 3), layout='constrained')
+    figure.suptitle(
+        f'simulated TSF-85, windows of {1e3 * WINDOWS["length_s"]:g} ms, slowed {SLOWER:g} times', fontsize=12
+    )
     titles = (f'{SHOWN[0]}: trained', f'{SHOWN[1]}: never trained')
     panels = [Panel(slide, *column, title) for slide, column, title in zip(slides, axes.T, titles, strict=True)]
     for axis in axes[1:].ravel():
         axis.spines[['top', 'right']].set_visible(False)
         axis.tick_params(labelsize=11)
-    ends = np.cumsum([slide.duration_s + 0.3 for slide in slides])
+    end_s = max(slide.duration_s for slide in slides)
 
     def draw(frame: int) -> None:
-        now_s = frame / FRAMES_PER_S / SLOWER if frame >= 0 else float(ends[-1])
-        panels[0].draw(now_s)
-        panels[1].draw(now_s - float(ends[0]))
+        for panel in panels:
+            panel.draw(frame / FRAMES_PER_S / SLOWER if frame >= 0 else end_s)
 
-    moving = range(round(float(ends[-1]) * FRAMES_PER_S * SLOWER))
+    moving = range(round(end_s * FRAMES_PER_S * SLOWER))
     hold = [-1] * round(HOLD_S * FRAMES_PER_S)
     FuncAnimation(figure, draw, frames=[-1, *moving, *hold]).save(path, PillowWriter(FRAMES_PER_S), dpi=112)
 

@@ -69,7 +69,7 @@ def test_a_surface_is_collected_at_places_that_training_can_leave_out(operator, 
 
     operator.set_parameters('explorer', {'patch_x_high_m': -0.05})
     assert main(['collect', 'suede', str(bags), *QUICK]) == 2
-    assert 'no surface patch is taught: touch the corners' in capsys.readouterr().err
+    assert 'no surface patch is set: touch the corners' in capsys.readouterr().err
     operator.set_parameters('explorer', {'patch_x_high_m': 0.05})
 
 

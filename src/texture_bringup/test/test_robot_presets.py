@@ -78,6 +78,9 @@ def test_the_page_with_the_limits_has_those_of_the_preset():
         f'`approach_travel_m` {1e3 * values["approach_travel_m"]:g} mm in at most {values["approach_timeout_s"]:g} s',
     ):
         assert expected in page.replace('\n', ' ')
+    for name in ('robots', 'safety'):
+        assert f'(UR5e presets {200 * tolerance:g} %)' in (ROOT / 'docs' / f'{name}.md').read_text()
+    assert f'before the slide (UR5e presets {100 * tolerance:g} %)' in (ROOT / 'docs' / 'safety.md').read_text()
 
 
 @pytest.mark.parametrize('robot', ROBOTS)

@@ -138,7 +138,7 @@ POWER_SETTLE_MS = 100
 AFTER_SAMPLE_NS, BETWEEN_WORDS_NS = 50_000, 10_000
 OVERHEAD_NS = 3_000  # of a slot, as the vendor's library reckons
 SELECT_ALL, SELECT_NONE = 0x07, 0x00
-SELECT = (0x01, 0x02, 0x04)  # the places of a board for three BioTacs
+SELECT = (0x01, 0x02, 0x04)  # the sockets of a board for three BioTacs
 READ_PROPERTY, SERIAL_NUMBER = 0x61, 0x15
 SERIAL_BYTES, SERIAL_START = 16, 'BT'
 MODE_0 = (0, 0)  # clock idles low, sampled at the first edge
@@ -227,7 +227,7 @@ class Cheetah:
         api.ch_spi_queue_oe(handle, 1)
 
     def _serial(self, select: int) -> str:
-        """Return the serial number of the BioTac at a place, '' if there is none."""
+        """Return the serial number of the BioTac in a socket, '' if there is none."""
         api, handle = self._api, self._handle
         api.ch_spi_queue_clear(handle)
         api.ch_spi_queue_ss(handle, select)
@@ -289,7 +289,7 @@ def decode(frames: bytes, layout: BioTacLayout, fingers: int) -> Replies:
     """Return what the BioTacs measured in one or several whole frames.
 
     A word is 12 bits: seven in the upper bits of the first byte, five in the upper bits of the second; bit 0 of each
-    byte makes its number of ones odd. A word belongs to the BioTac at its place in the reply, whatever became of
+    byte makes its number of ones odd. A word belongs to the BioTac at its position in the reply, whatever became of
     its neighbours, and to the channel of its slot: what comes back while the command goes out is not relied on.
     """
     size = layout.frame_bytes(fingers)
@@ -368,7 +368,7 @@ class BioTac(FramedSensor):
         self._places = 0  # of the board; 0 until its first frame
         self._damaged = self._refused = self._answered = 0
         self._unanswered = 0  # frames since the last one in which a requested finger answered
-        self._serials: tuple[str, ...] = ()  # of the BioTac at each place, '' where there is none
+        self._serials: tuple[str, ...] = ()  # of the BioTac in each socket, '' where there is none
 
     @property
     def valid_frames(self) -> int:

@@ -23,14 +23,14 @@ MakeSensor = Callable[[SensorParams, Callable[[], int]], Sensor]
 
 
 SENSORS: Mapping[str, MakeSensor] = {
-    'tsf85': Tsf85,  # Robotiq TSF-85 / CoRo fingertip
-    'tsf85_pair': partial(Tsf85, fingers=(0, 1)),  # both fingers; topics finger0/signal and so on
-    'tsf85_3x4': partial(Tsf85, layout=TSF85S['tsf85_3x4']),  # its prototype: 3 rows of 4 taxels at 25 Hz
-    'biotac': BioTac,  # SynTouch BioTac, 19 electrodes
-    'biotac_sp': partial(BioTac, layout=BIOTACS['biotac_sp']),  # 24 electrodes
-    'biotac_hand': partial(BioTac, fingers=(0, 1, 2)),  # all places of a board; topics finger0/signal and so on
-    'daq': daq,  # 4 PVDF films and 4 strain gauges at 2.5 kHz, Jamali & Sammut 2010
-    'pvdf': pvdf,  # PVDF film and force sensor, Hu et al. 2014
-    'anyskin': AnySkin,  # AnySkin and ReSkin: 5 magnetometers under a magnetic skin
-    'sound_card': SoundCard,  # contact microphone or accelerometer on a sound card
+    'tsf85': Tsf85,  # Robotiq TSF-85 (CoRo fingertip), one finger: vibration and IMU at 1000 Hz, 28 taxels at 60 Hz
+    'tsf85_pair': partial(Tsf85, fingers=(0, 1)),  # both fingers of a TSF-85, topics finger0/signal, …
+    'tsf85_3x4': partial(Tsf85, layout=TSF85S['tsf85_3x4']),  # prototype of the TSF-85, 12 taxels at 25 Hz
+    'biotac': BioTac,  # SynTouch BioTac: PAC at 2200 Hz, 19 electrodes at 100 Hz
+    'biotac_sp': partial(BioTac, layout=BIOTACS['biotac_sp']),  # BioTac SP: PAC at 2200 Hz, 24 electrodes at 81.5 Hz
+    'biotac_hand': partial(BioTac, fingers=(0, 1, 2)),  # three BioTacs of a board, topics finger0/signal, …
+    'daq': daq,  # 4 PVDF films and 4 strain gauges at 2500 Hz (Jamali & Sammut 2010), or other ADC channels
+    'pvdf': pvdf,  # PVDF film at 4096 Hz and force sensor at 64 Hz (Hu et al. 2014)
+    'anyskin': AnySkin,  # AnySkin or ReSkin: 5 magnetometers under a magnetic skin, 100 to 400 Hz
+    'sound_card': SoundCard,  # contact microphone or accelerometer on a sound card, at 16 kHz
 }

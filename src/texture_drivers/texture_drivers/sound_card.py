@@ -133,7 +133,7 @@ class SoundCardSettings:
     )
     channels: int = param(1, 'Number of channels that are read, from the first on.', low=1, high=8)
     decimation: int = param(
-        3,  # 16 kHz: docs/sensors.md has what it gains over 4 and 8 kHz
+        3,  # 48 to 16 kHz
         'Factor by which the rate is lowered behind a low-pass; a larger one costs less computing time and '
         'keeps a smaller band, up to 0.34 of the lower rate.',
         low=1,

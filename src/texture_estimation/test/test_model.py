@@ -84,7 +84,7 @@ def refused(path, match):
 def test_missing_files_are_refused(saved):
     refused(saved.parent / 'none.npz', 'there is no model')
     saved.unlink()
-    refused(saved, 'belongs next to its card')
+    refused(saved, 'belongs next to its model card')
     saved.write_bytes(b'')
     saved.with_suffix('.json').unlink()
     refused(saved, 'there is no card')
@@ -158,7 +158,7 @@ def test_a_small_file_that_unpacks_to_more_than_a_model_has_is_refused_before_it
 def test_parts_that_do_not_fit_the_card_are_refused(saved):
     content = saved.read_bytes()
     rewrite(saved, content, labels=['cork'])
-    refused(saved, 'its card names 1')
+    refused(saved, 'its model card names 1')
     rewrite(saved, content, features=['one'])
     refused(saved, 'train it again')
 

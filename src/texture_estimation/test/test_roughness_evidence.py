@@ -103,7 +103,7 @@ def test_a_grade_is_final_once_more_sliding_gains_little_and_nothing_follows(mod
     [
         (vector(force_n=0.01), 'no contact: the force is 0.01 N'),
         (vector((3.0, 0.0, 0.5, 2.0)), 'weaker than on the smoothest training surface'),
-        (vector((3.0, 0.0, 4.0, 8.0)), 'skids'),
+        (vector((3.0, 0.0, 4.0, 8.0)), 'stick-slip'),
         (vector((np.nan, 0.0, 0.5, 8.0)), "'signal/signal_energy/f' is not finite"),
         (vector((3.0, 0.0, 0.5, np.inf)), "'signal/log_variance/f' is not finite"),
         (vector(feature_set='abcd1234 signal=2000Hz*1'), 'the sampling rate'),

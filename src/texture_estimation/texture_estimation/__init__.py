@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recipes, learners and evidence: from features to texture and roughness.
 
-Data in: feature vectors and a model, which is a file with its card `NAME.json`. Data out: a `TextureEstimate` or
+Data in: feature vectors and a model, which is a file with its model card `NAME.json`. Data out: a `TextureEstimate` or
 `RoughnessEstimate` after each window, with a calibrated confidence or an interval. Loading a model runs no code.
 
 .. code-block:: python

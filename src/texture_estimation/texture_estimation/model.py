@@ -171,7 +171,7 @@ def read_tree(path: str | Path, *, of: str) -> dict[str, Any]:
         content = read_bounded(arrays_path, MAX_BYTES)
     except (OSError, FileRefused) as error:
         raise ModelMismatch(
-            f"model file '{arrays_path}' cannot be read: {error}; it belongs next to its card"
+            f"model file '{arrays_path}' cannot be read: {error}; it belongs next to its model card"
         ) from error
     if hashlib.sha256(content).hexdigest() != tree.get('sha256'):
         raise ModelMismatch(
@@ -583,7 +583,7 @@ class TextureModel(StoredModel):
         if np.isnan(answer).any():
             raise ModelMismatch('its values are too large to be features')
         if answer.shape != (len(self.labels),):
-            raise ModelMismatch(f'it answers {answer.shape} numbers, its card names {len(self.labels)} labels')
+            raise ModelMismatch(f'it answers {answer.shape} numbers, its model card names {len(self.labels)} labels')
         if self.acceptance.distance is not None:
             self.acceptance.assess(0.0, float(self.acceptance.distance.score(self.compared(nothing), 0)), 1.0)
             self.acceptance.members(np.exp(answer), 1.0)

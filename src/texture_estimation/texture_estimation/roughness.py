@@ -368,7 +368,7 @@ class RoughnessModel(StoredModel):
         if LEVEL in highest and highest[LEVEL] < self.limits[LEVEL]:
             return 'no contact: the signal is weaker than on the smoothest training surface'
         if STICK_SLIP in highest and highest[STICK_SLIP] > self.limits[STICK_SLIP]:
-            return 'the finger skids: stick-slip dominates the signal'
+            return 'stick-slip dominates the signal'
         return ''
 
     def grade(self, X: Array) -> tuple[Array, Array]:
@@ -425,7 +425,7 @@ class RoughnessAccumulator:
     def __init__(self, model: RoughnessModel | None) -> None:
         self.model = model
         self.refused = 0  # vectors of another fingerprint
-        self.unusable = 0  # windows without contact, with skids or with values that are not finite
+        self.unusable = 0  # windows without contact, with stick-slip or with values that are not finite
         self.silent = 0  # windows to which the regressor gave no grade
         self._over = True
         self._final = False

@@ -48,7 +48,7 @@ def test_the_touches_lie_on_the_patch_and_spread_over_places_directions_speeds_a
 
 
 def test_a_patch_that_is_too_small_and_a_nameless_surface_are_refused():
-    with pytest.raises(InvalidData, match=r'0\.01 m by 0\.01 m; ask for shorter slides, or teach a larger patch'):
+    with pytest.raises(InvalidData, match=r'0\.01 m by 0\.01 m; ask for shorter slides, or touch a larger patch'):
         PlacePlan('oak', PARAMS, Patch(0.0, 0.01, 0.0, 0.01))
     with pytest.raises(InvalidData, match='no surface was named'):
         PlacePlan(' ', PARAMS, PATCH)

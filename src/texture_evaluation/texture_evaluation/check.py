@@ -104,7 +104,7 @@ def check_finger(
     if not correct:
         return False, f'{sentence}. Clean or replace the skin, or correct the model by --correct'
     write_json(Correction.of(found).as_mapping(), correction)
-    return False, f"{sentence}. The model is corrected, '{correction}': start it again, with its card as the recipe"
+    return False, f"{sentence}. The model is corrected, '{correction}': start it with its model card as the recipe"
 
 
 def adapt_to_today(model: str | Path, bags: Sequence[str | Path], today: Sequence[str | Path]) -> str:

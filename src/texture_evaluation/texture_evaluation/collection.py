@@ -34,7 +34,7 @@ SHORTEST_S = 0.6  # of a slide: one window, and what starts late
 
 @dataclass(frozen=True)
 class CollectionParams:
-    """How a surface is collected; the places lie on the taught patch."""
+    """How a surface is collected; the places lie on the surface patch."""
 
     places: int = param(6, 'Fewest places that are touched.', low=2, high=1000)
     most_places: int = param(18, 'Most places that are touched.', low=2, high=1000)
@@ -138,7 +138,7 @@ class PlacePlan:
             raise InvalidData(
                 f'no slide of {params.distance_m:g} m with its ramps lies on the patch, which is '
                 f'{patch.x_high_m - patch.x_low_m:g} m by {patch.y_high_m - patch.y_low_m:g} m; ask for shorter '
-                'slides, or teach a larger patch'
+                'slides, or touch a larger patch'
             )
 
     def next(self) -> ExplorationRequest:

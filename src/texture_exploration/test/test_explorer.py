@@ -194,7 +194,7 @@ def test_an_exploration_begins_at_its_start_on_the_patch_and_lifts_there(explore
 @pytest.mark.parametrize(
     ('patch', 'start', 'said'),
     [
-        (SurfacePatch(), {}, 'no surface is taught'),
+        (SurfacePatch(), {}, 'no surface patch is set'),
         (PATCH, {'start_x_m': 0.06}, r'start_x_m is 0\.06, off the surface patch; allowed is -0\.03 to 0\.05 m'),
         (PATCH, {'start_y_m': float('nan')}, 'start_y_m is nan, off the surface patch'),
         (PATCH, {'start_x_m': 0.045}, 'leaves the workspace.*the workspace of a request with a start is the surface'),

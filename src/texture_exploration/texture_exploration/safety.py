@@ -218,7 +218,7 @@ class SafetyLimits:
 
 @dataclass(frozen=True)
 class SurfacePatch:
-    """The rectangle of the surface frame in which an exploration with a start stays; not taught without extent."""
+    """The rectangle of the surface frame in which an exploration with a start stays; none without extent."""
 
     patch_x_low_m: float = _edge(0.0, 'Lowest x', PATCH)
     patch_x_high_m: float = _edge(0.0, 'Highest x', PATCH)
@@ -231,7 +231,7 @@ class SurfacePatch:
             return home
         if not (self.patch_x_low_m < self.patch_x_high_m and self.patch_y_low_m < self.patch_y_high_m):
             raise MotionRefused(
-                f'{request.motion}: no surface is taught, so a start means nothing; touch the corners of the surface '
+                f'{request.motion}: no surface patch is set for a start; touch the corners of the surface '
                 "(touch_surface), or set 'patch_x_low_m', 'patch_x_high_m', 'patch_y_low_m' and 'patch_y_high_m'",
                 ExplorationError.OUTSIDE_WORKSPACE,
                 'use_start',

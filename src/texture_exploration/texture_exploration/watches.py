@@ -226,8 +226,8 @@ class OvershootWatch:
         reached_n = statistics.median(self._forces)
         if len(self._forces) == FORCES and reached_n > self._most_n:
             raise MotionAborted(
-                f'the force reached {reached_n:.2f} N of {self._force_n:.3g} N wanted before the slide; the contact is '
-                "stiffer than 'max_stiffness_n_m' or 'approach_stiffness_n_m', or arm or force later than "
+                f'the force reached {reached_n:.2f} N of {self._force_n:.3g} N requested before the slide; the contact '
+                "is stiffer than 'max_stiffness_n_m' or 'approach_stiffness_n_m', or arm or force later than "
                 "'loop_delay_s'",
                 ExplorationError.FORCE_LIMIT,
             )

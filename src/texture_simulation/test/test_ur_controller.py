@@ -162,4 +162,4 @@ def test_the_dashboard_answers_line_by_line(served):
     assert served.silent_s == 0.5
     run(served, 0.6)
     assert served.silent_s == 0.0
-    assert dashboard.receive(b'emulate speed much\n') == b"came 'much'; a number of shares is needed\n"
+    assert dashboard.receive(b'emulate speed much\n') == b"came 'much'; a number of times full speed is needed\n"

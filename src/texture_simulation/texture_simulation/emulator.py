@@ -100,7 +100,7 @@ def _live(
     return make
 
 
-SERIALS = ('BT-0', 'BT-1', 'BT-2')  # of the BioTacs of a hand, by place
+SERIALS = ('BT-0', 'BT-1', 'BT-2')  # of the BioTacs of a hand, by socket
 LIVE_SENSORS: Mapping[str, MakeLiveSensor] = {
     'tsf85': _live(models.SENSORS['tsf85'], devices.EmulatedTsf85),
     'tsf85_pair': _live(models.SENSORS['tsf85'], devices.EmulatedTsf85, 2),

@@ -86,7 +86,7 @@ def _configure_explore(parser: argparse.ArgumentParser) -> None:
         type=float,
         nargs=2,
         metavar=('X', 'Y'),
-        help='where to begin on the taught surface patch, in the surface frame, m; default: where the explorer took '
+        help='where to begin on the surface patch, in the surface frame, m; default: where the explorer took '
         'control of the arm',
     )
     parser.add_argument('--surface', default='', help='true name of the surface, if known; it labels a recording')
@@ -301,7 +301,7 @@ def collect_surface(
     low_x, high_x, low_y, high_y, low_n, high_n, high_m_s = operator.parameters('explorer', (*PATCH, *LIMITS))
     if not (low_x < high_x and low_y < high_y):
         raise InvalidData(
-            'no surface patch is taught: touch the corners of the surface with `texture touch-surface`, or give the '
+            'no surface patch is set: touch the corners of the surface with `texture touch-surface`, or give the '
             f'explorer {", ".join(PATCH)}'
         )
     patch = collection.Patch(low_x, high_x, low_y, high_y)
@@ -556,6 +556,6 @@ identify = Command(
     'repeat the slide with the largest information gain until the label is decided', _configure_identify, _identify
 )
 collect = Command(
-    'touch a surface at many places of the taught patch, and record labelled slides', _configure_collect, _collect
+    'touch a surface at many places of the surface patch, and record labelled slides', _configure_collect, _collect
 )
 check = Command('slide over the reference plate, and report whether the finger is as trained', _configure_check, _check)

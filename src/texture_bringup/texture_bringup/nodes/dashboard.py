@@ -132,7 +132,7 @@ class DashboardNode(Node):
             return await self._run(stopped, 'check', path)
 
     async def collect(self, asked: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Record labelled slides at many places of the taught patch, into the folder `surfaces` of the recordings."""
+        """Record labelled slides at many places of the surface patch, into the folder `surfaces` of the recordings."""
         surface = checked_label(_short(str(asked.get('surface', ''))))
         if not surface or surface.startswith('-'):
             raise InvalidParameter('the surface to collect has no name; give one')

@@ -124,4 +124,4 @@ def graded_summary(model: RoughnessModel, out: Path) -> list[str]:
 
 
 def _saved_as(out: Path) -> str:
-    return f'saved as {out.with_name(out.name.removesuffix(".npz"))}.npz, with its card next to it'
+    return f'saved as {out.with_name(out.name.removesuffix(".npz"))}.npz, with its model card next to it'

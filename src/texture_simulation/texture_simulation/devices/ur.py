@@ -476,8 +476,8 @@ class Session(asyncio.Protocol):
 
 # The dashboard: one line asks, one line answers. Next to the real commands it obeys the fault switches of the emulator:
 # `emulate protective stop`, `emulate silence SECONDS`, in which nothing is answered, `emulate slow SECONDS`,
-# which lets stops, the end of force control and zeroing be acknowledged so much later, and `emulate speed SHARE`, as of
-# the slider on the pendant.
+# which lets stops, the end of force control and zeroing be acknowledged so much later, and `emulate speed FRACTION`, as
+# of the slider on the pendant.
 # `load NAME` and `play` start a foreign program, which takes no commands.
 
 SERIAL_NUMBER = '20205500001'
@@ -512,7 +512,7 @@ class DashboardSession(Session):
             'emulate protective stop': partial(_do, controller.protective_stop, 'Stopped'),
             'emulate silence': partial(_set, partial(setattr, controller, 'silent_s'), 'seconds'),
             'emulate slow': partial(_set, partial(setattr, controller, 'acknowledge_s'), 'seconds'),
-            'emulate speed': partial(_set, partial(setattr, controller.robot, 'speed_fraction'), 'shares'),
+            'emulate speed': partial(_set, partial(setattr, controller.robot, 'speed_fraction'), 'times full speed'),
         }
 
     def receive(self, data: bytes) -> bytes:
