@@ -34,7 +34,11 @@ class Explorer:
         assert node == 'explorer'
         return [EXPLORER[name] for name in names]
 
-    def explore(self, request):
+    def watch_stops(self):
+        return lambda: False
+
+    def explore(self, request, stopped):
+        assert not stopped()
         self.requests.append(request)
         end = self._ends.pop(0)
         if isinstance(end, BaseException):
