@@ -423,7 +423,10 @@ class FreeAir:
 
     def update(self, time_ns: int, position: Vector, force_n: float) -> bool:
         """Note a state of the arm in the frame of the surface, and return whether free air is proven."""
-        self._smooth(time_ns, force_n)
+        passed_s, self._time_ns = (time_ns - self._time_ns) * 1e-9, time_ns
+        if math.isfinite(self._force_n):
+            force_n = self._force_n - (force_n - self._force_n) * math.expm1(-max(0.0, passed_s) / SMOOTHING_S)
+        self._force_n = force_n
         start = self._start
         # Written so that NaN also counts as a change.
         if start is None or not abs(self._force_n - self._start_n) <= self._steady_n:
@@ -431,12 +434,6 @@ class FreeAir:
         elif not self.proven:
             self._rise(start, position)
         return self.proven
-
-    def _smooth(self, time_ns: int, force_n: float) -> None:
-        passed_s, self._time_ns = (time_ns - self._time_ns) * 1e-9, time_ns
-        if math.isfinite(self._force_n):
-            force_n = self._force_n - (force_n - self._force_n) * math.expm1(-max(0.0, passed_s) / SMOOTHING_S)
-        self._force_n = force_n
 
     def _restart(self, position: Vector) -> None:
         self._start, self._start_n = position, self._force_n
@@ -497,13 +494,10 @@ class ForceZero:
         if rested_ns >= CALM_NS:
             self._readings.append(reading_n)
         if rested_ns >= CALM_NS + AVERAGED_NS:
-            self._take_zero()
-
-    def _take_zero(self) -> None:
-        self.offset_n = np.mean(np.array(self._readings), axis=0)
-        self.zeroed = True
-        self.zeroings += 1
-        self.presume_contact()
+            self.offset_n = np.mean(np.array(self._readings), axis=0)
+            self.zeroed = True
+            self.zeroings += 1
+            self.presume_contact()
 
 
 # --------------------

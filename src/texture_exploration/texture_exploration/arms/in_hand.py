@@ -233,8 +233,7 @@ class InHandArm(Arm):
         for finger in self._fingers.values():
             finger.restart()
         now_s = stepped_s = time.monotonic()
-        lag_s = 0.0  # for which the fingers still have to move
-        errors: dict[str, None] = {}
+        errors, lag_s = dict[str, None](), 0.0  # and for how long the fingers still have to move
         while not self._closing.wait(max(0.0, now_s + period_s - time.monotonic())):
             now_s, asked_ns = time.monotonic(), time.monotonic_ns()  # motors answer soon, a busy machine reads it late
             motors = bus.read()
@@ -264,8 +263,7 @@ class InHandArm(Arm):
 
     def _publish(self, bus: DynamixelBus, errors: Iterable[str], asked_ns: int) -> None:
         fault = '; '.join(dict.fromkeys([*map(bus.why_missing, sorted(bus.missing)), *errors]))
-        tips = {name: finger.tip for name, finger in self._fingers.items()}
-        self._state = HandState(asked_ns, tips, fault)
+        self._state = HandState(asked_ns, {name: finger.tip for name, finger in self._fingers.items()}, fault)
         self._fresh.set()
 
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import termios
 import threading
 import time
@@ -91,9 +92,8 @@ class RailsArm(Arm):
         self._failure = 'the rails are not connected; connect them first'
         self._deframer = FrameDecoder()
         self._sending = threading.Lock()
-        self._sent = 0
-        self._states: deque[tuple[int, Vector]] = deque(maxlen=SPEED_OVER)  # device time in µs, and place
-        self._place_ns = 1  # of the last one, since the first
+        self._sent = self._time_us = self._place_ns = 0  # the last two by the clock of the rails
+        self._states: deque[tuple[int, Vector]] = deque(maxlen=SPEED_OVER)  # time by that clock, ns, and place
         self._state: ArmState | None = None
 
     def connect(self) -> None:
@@ -198,9 +198,9 @@ class RailsArm(Arm):
         x, y, z, force_mn, flags, _watchdog_stops = STATE_BODY.unpack(frame.body)
         per_m, params = self._params.xy_counts_m, self._params
         place: Vector = (x / per_m, y / per_m, params.height_m + z / params.z_counts_m)
-        before_us = self._states[-1][0] if self._states else frame.time_us
-        self._place_ns += 1000 * ((frame.time_us - before_us) % (1 << 32))
-        self._states.append((frame.time_us, place))
+        self._place_ns += 1000 * ((frame.time_us - self._time_us) % (1 << 32))
+        self._time_us = frame.time_us
+        self._states.append((self._place_ns, place))
         self._state = ArmState(
             time_ns=time.monotonic_ns(),
             position=place,
@@ -214,10 +214,8 @@ class RailsArm(Arm):
 
     def _velocity(self) -> Vector:
         """Return the speed by the clock of the rails, over the last states."""
-        (begin_us, first), (end_us, last) = self._states[0], self._states[-1]
-        passed_s = ((end_us - begin_us) % (1 << 32)) * 1e-6
-        if not passed_s:
-            return 0.0, 0.0, 0.0
+        (begin_ns, first), (end_ns, last) = self._states[0], self._states[-1]
+        passed_s = (end_ns - begin_ns) * 1e-9 or math.inf
         vx, vy, vz = ((b - a) / passed_s for a, b in zip(first, last, strict=True))
         return vx, vy, vz
 

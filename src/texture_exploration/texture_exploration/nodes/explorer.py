@@ -389,8 +389,7 @@ class ExplorerNode(PatientLifecycleNode):
         return message
 
     def _forget_touches(self) -> str:
-        count = self._explorer.forget_touches()
-        return f'touches of the surface that are forgotten: {count}; the surface stays as it is'
+        return f'forgotten touches of the surface: {self._explorer.forget_touches()}; the surface stays as it is'
 
     def _on_estimate(self, message: msg.TextureEstimate | msg.RoughnessEstimate) -> None:
         try:
