@@ -105,9 +105,11 @@ def definitions(held: Any, name: str = '') -> Iterator[tuple[str, str]]:
 
 
 def outdated(root: Path, digest_of: Callable[[str], str]) -> list[str]:
-    """Return which benchmarks are stored with a definition of a recipe that is not today's."""
+    """Return which benchmarks are stored with a definition of a recipe that is not today's, or of a reduced run."""
     faults = []
     for path in sorted((root / 'docs' / 'charts').glob('*.json')):
+        if json.loads(path.read_text(encoding='utf-8')).get('reduced'):
+            faults.append(f'{path.name}: it is of a reduced run; run texture benchmark {path.stem}')
         changed = sorted({name for name, digest in definitions(numbers(path)) if digest != digest_of(name)})
         if changed:
             faults.append(

@@ -100,6 +100,9 @@ def test_figures_of_a_recipe_that_changed_are_a_fault_that_gives_its_name_and_th
     [fault] = figures.outdated(root, today.__getitem__)
     assert fault == ('overview.json: recipes changed since it was measured: any-place; run texture benchmark overview')
     assert figures.outdated(root, {**today, 'any-place': 'ffff0000'}.__getitem__) == []
+    (root / 'docs/charts/scale.json').write_text(json.dumps({'numbers': {}, 'reduced': 'reduced run'}))
+    [fault] = figures.outdated(root, {**today, 'any-place': 'ffff0000'}.__getitem__)
+    assert fault == 'scale.json: it is of a reduced run; run texture benchmark scale'
 
 
 def test_every_table_of_the_pages_is_the_stored_one(monkeypatch: pytest.MonkeyPatch) -> None:
