@@ -1,12 +1,13 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from texture_core.errors import InvalidData
+from texture_core.errors import ExplorationError, InvalidData
 from texture_core.types import NANOSECONDS, ExplorationState, Phase, TactileSignal
 from texture_recordings.bags import BagWriter, Continuity
 from texture_recordings.nodes.replay import Schedule
@@ -18,13 +19,15 @@ pytestmark = pytest.mark.ros
 SLID = (Phase.APPROACH, Phase.SLIDE, Phase.DONE)
 
 
-def write(path: Path, surfaces: list[str], start_s: int, phases: tuple[Phase, ...] = SLID) -> Path:
+def write(path: Path, surfaces: list[str], start_s: int, phases: tuple[Phase, ...] = SLID, error: int = 0) -> Path:
     with BagWriter(path) as bag:
         for count, surface in enumerate(surfaces):
             stamp_ns = (start_s + 10 * count) * NANOSECONDS
             name = f'{path.stem}/{count}'
             for step, phase in enumerate(phases):
                 state = ExplorationState(stamp_ns + step, name, 'linear_slide', phase, surface=surface)
+                if phase is Phase.ABORTED:
+                    state = replace(state, error_code=error)
                 bag.write('exploration', state, stamp_ns + step)
             samples = np.full((1, 1), count, dtype=np.float32)
             bag.write('signal', TactileSignal(stamp_ns, 's', ('a',), (), 1.0, count, samples), stamp_ns + 5)
@@ -56,6 +59,15 @@ def test_slides_are_counted_for_each_surface_in_the_order_recorded_over_all_bags
         'late/1': ('felt', 3),
     }
     assert {slide.exploration_id for slide in find_slides([late, early], '2')} == {'early/2', 'late/0'}
+
+
+def test_a_slide_whose_force_was_wrong_is_left_out_and_named(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    aborted = (Phase.SLIDE, Phase.LIFT, Phase.ABORTED)
+    stopped = write(tmp_path / 'stopped', ['cork'], 0, aborted, ExplorationError.STOPPED)
+    drifted = write(tmp_path / 'drifted', ['cork'], 100, aborted, ExplorationError.FORCE_SENSOR)
+    good = write(tmp_path / 'good', ['cork'], 200)
+    assert [slide.name for slide in find_slides([stopped, drifted, good])] == ['cork/1', 'cork/3']
+    assert 'left out, as the force sensor was wrong in their explorations: cork/2' in caplog.text
 
 
 def test_a_slide_yields_its_messages_only(tmp_path: Path) -> None:

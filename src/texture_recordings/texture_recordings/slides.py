@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from texture_core.cli import progress
-from texture_core.errors import InvalidData
+from texture_core.errors import ExplorationError, InvalidData
 from texture_core.types import (
     NANOSECONDS,
     TURNED_RAD,
@@ -73,6 +73,11 @@ class LabelledSlide:
     def session(self) -> str:
         """Name of the bag without its ending: slides of one bag were recorded in one session."""
         return self.bag.name.removesuffix('.mcap')
+
+    @property
+    def force_was_wrong(self) -> bool:
+        """Whether its exploration ended with a fault of the force sensor, such as drift found after the slide."""
+        return any(state.error_code == ExplorationError.FORCE_SENSOR for state in self.states)
 
     @property
     def sliding(self) -> Sequence[ExplorationState]:
@@ -251,6 +256,10 @@ def find_slides(
             f"no slide in {_named(paths)} is labelled; give the surface's name with each exploration you record"
         )
     numbered = with_places(number_slides(labelled))
+    if doubtful := [slide for slide in numbered if slide.force_was_wrong]:
+        names = ', '.join(slide.name for slide in doubtful)
+        logging.getLogger(__name__).warning('left out, as the force sensor was wrong in their explorations: %s', names)
+        numbered = [slide for slide in numbered if not slide.force_was_wrong]
     found = [slide for slide in numbered if wanted is None or slide.number in wanted]
     if not found:
         most = max(slide.number for slide in numbered)
