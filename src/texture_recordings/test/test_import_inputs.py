@@ -250,6 +250,7 @@ MISSING = X.copy()
 MISSING[[100, 200]] = np.nan
 PAC = {'columns': ['pac_*'], 'rate_hz': 1200.0}
 THOUSANDS = [f'{value:,}' for value in np.round(2000 * X).astype(int).tolist()]
+POINTS = [value.replace(',', '.') for value in THOUSANDS]
 GERMAN = {'format': {'delimiter': ';', 'decimal': ','}, **RATE}
 TWICE = {'signal': {'columns': ['x'], 'rate_hz': 100.0}, 'signal_static': {'columns': ['y'], 'rate_hz': 10.0}}
 WINDOWS = np.random.default_rng(0).normal(size=(30, 40)).round(3)
@@ -394,6 +395,24 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
     'commas of thousands': (
         text('n;x\n' + ''.join(f'{n};{x}\n' for n, x in enumerate(THOUSANDS))), GERMAN, 'seems to separate thousands',
     ),
+    'points of thousands or decimals': (
+        text('x\n' + lines(POINTS)), RATE, r"'x': the point of '\S+' may be decimal or .* format: \{decimal: '\.'\}",
+    ),
+    'points of thousands in ms': (
+        csv([f'{n:,}'.replace(',', '.') for n in range(0, 10 * N, 10)], X), timed('ms'), "column 't': the point of '1",
+    ),
+    'points of thousands behind many rows': (
+        text('x\n' + lines([*range(900), *(['7'] * 25_000), '1.234', '1.234', '1.235'])), RATE, "the point of '1.234'",
+    ),
+    'points that are stated to be decimal': (
+        text('x\n' + lines(POINTS)), {**RATE, 'format': {'decimal': '.'}}, [('cork', np.array(POINTS, float))],
+    ),
+    **{
+        f'points, and {cell}': (
+            csv([*POINTS[:-1], cell], names='x'), RATE, [('cork', np.array([*POINTS[:-1], cell], float))],
+        )
+        for cell in ('0.125', '1234.125', '1.25')
+    },
 }  # fmt: skip
 
 

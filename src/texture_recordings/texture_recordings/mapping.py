@@ -55,7 +55,11 @@ class FileFormat:
     """How a file is read, where its kind does not say it."""
 
     delimiter: str = param('', "Character between columns of a text file; '' finds one of , ; tab | or space.")
-    decimal: str = param('.', 'Decimal sign of numbers in a text file.', choices=('.', ','))
+    decimal: str = param(
+        '',
+        "Decimal sign of numbers in a text file; '' is '.', and refuses a column in which it may separate thousands.",
+        choices=('', '.', ','),
+    )
     skip_rows: int = param(0, 'Number of lines of a text file that are skipped at its top.', low=0, high=10_000)
     header: bool = param(True, 'Says whether a row with names of columns comes first; without, they count from 0.')
     transpose: bool = param(False, 'Says whether arrays are (n_channels, n_samples) and not (n_samples, n_channels).')

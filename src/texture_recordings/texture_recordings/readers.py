@@ -150,7 +150,8 @@ NO_TEXT = frozenset(('nan', 'na', 'n/a', '#n/a', 'null'))  # 'none' may be a lab
 BLANK = frozenset(('', 'nan', 'na', 'null', 'none'))
 NO_WORD = NO_TEXT | BLANK | {'inf', '-inf', '+inf'}
 WORD = re.compile(r'[^\W\d_]')
-THOUSANDS = re.compile(r'[+-]?[1-9]\d{0,2}(,\d{3})+')
+THOUSANDS = {sign: re.compile(rf'[+-]?[1-9]\d{{0,2}}({re.escape(sign)}\d{{3}})+') for sign in '.,'}
+FEW_THOUSANDS = 3  # cells with a point: fewer may be decimals by chance
 NUMERIC = 0.9  # share of numbers in a column of numbers
 
 
@@ -166,13 +167,10 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
     gapped, gap_reasons = list[AnyArray](), list[str]()
     with open_regular(path) as opened:
         # The names of the columns, and those that the mapping wants as numbers.
-        rest = _lines(opened, form)
-        first = next(rest, (0, ''))
-        rest = rest if form.header else chain([first], rest)
-        delimiter = form.delimiter or next((one for one in DELIMITERS if one in first[1]), ',')
-        names = _names(_cells(first[1], delimiter), form)
+        rest, delimiter, names = _opened(opened, form)
         numbers, conditions = _wanted(mapping, names)
         numeric: dict[str, bool] = {}
+        thousands = Thousands(numbers, form.decimal)
         # Block by block: the cells, what they are, and the rows that are malformed.
         for block in iter(lambda: list(islice(rest, BLOCK_ROWS)), []):
             take(len(block) * (len(names) + len(mapping.texts())))
@@ -199,7 +197,8 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
                         bad.setdefault(row, _reason(name, cells[row], form))
                     elif row not in bad and WORD.search(cells[row]) and cells[row].lower() not in NO_WORD:
                         words[row] = name
-                _refuse_commas(name, () if text else cells, form, delimiter)
+                _refuse_codes(name, () if text else cells, delimiter)
+                thousands.add(name, cells)
                 part[name] = _texts(cells) if text else values
             numbered = [number for number, _ in block]
             _refuse_other_rows(
@@ -216,6 +215,7 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
             parts.append(part)
     if not parts:
         raise InvalidData('it has no rows below the names of its columns; choose files with samples')
+    thousands.refuse()
     columns = {name: np.concatenate([part[name] for part in parts]) for name in names}
     marked = np.concatenate(junk)
     # A malformed row ends no slide: it has the texts of the one before.
@@ -252,6 +252,15 @@ def _refuse_other_rows(names: Sequence[str], malformed: Mapping[int, Sequence[st
         )
 
 
+def _opened(opened: Any, form: FileFormat) -> tuple[Iterator[tuple[int, str]], str, list[str]]:
+    """Return the lines of rows, the delimiter, and the names of the columns by the first row."""
+    rest = _lines(opened, form)
+    first = next(rest, (0, ''))
+    delimiter = form.delimiter or next((one for one in DELIMITERS if one in first[1]), ',')
+    names = _names(_cells(first[1], delimiter), form)
+    return rest if form.header else chain([first], rest), delimiter, names
+
+
 def _names(cells: Sequence[str], form: FileFormat) -> list[str]:
     """Return the names of the columns by the first row."""
     if cells == ['']:
@@ -276,13 +285,13 @@ def _names(cells: Sequence[str], form: FileFormat) -> list[str]:
 
 
 def _reason(name: str, cell: str, form: FileFormat) -> str:
-    decimal = form.decimal == '.' and math.isfinite(number_of(cell.replace(',', '.')))
+    decimal = form.decimal != ',' and math.isfinite(number_of(cell.replace(',', '.')))
     hint = "; if commas are decimal, write format: {decimal: ','}" if decimal else ''
     return f"column '{name}': '{cell[:40]}' is not a finite number{hint}"
 
 
-def _refuse_commas(name: str, cells: Sequence[str], form: FileFormat, delimiter: str) -> None:
-    """Refuse commas that may be decimal as well as delimiters, or that separate thousands where they are decimal."""
+def _refuse_codes(name: str, cells: Sequence[str], delimiter: str) -> None:
+    """Refuse digits that may stand behind a decimal comma, where commas are delimiters, too."""
     digits = (
         [cell for cell in cells if cell]
         if delimiter == ',' and all(cell.isdigit() or not cell for cell in cells)
@@ -293,11 +302,42 @@ def _refuse_commas(name: str, cells: Sequence[str], form: FileFormat, delimiter:
             f"the column '{name}' holds digits such as {digits[0]}, so commas may be decimal as well as between "
             'columns; save it with another delimiter'
         )
-    commas = [cell for cell in cells if ',' in cell] if form.decimal == ',' else []
-    if 0 < len(commas) < len(cells) and all(THOUSANDS.fullmatch(cell) for cell in commas):
-        raise InvalidData(
-            f"column '{name}': the comma of '{commas[0]}' seems to separate thousands; save numbers without such commas"
-        )
+
+
+class Thousands:
+    """Columns whose signs may separate thousands: some cells have none, and three digits follow it in all others."""
+
+    def __init__(self, names: Iterable[str], decimal: str) -> None:
+        self._decimal, self._sign = decimal, decimal or '.'
+        self._signed: dict[str, list[str]] = {name: [] for name in names}  # without columns of certain decimals
+        self._whole: set[str] = set()
+
+    def add(self, name: str, cells: Sequence[str]) -> None:
+        """Look at further cells of a column."""
+        if name not in self._signed:
+            return
+        signed = [cell for cell in cells if self._sign in cell]
+        if all(THOUSANDS[self._sign].fullmatch(cell) for cell in signed):
+            self._signed[name] += signed[:FEW_THOUSANDS]
+            self._whole |= {name} if any(cell.lstrip('+-').isdigit() for cell in cells) else set()
+        else:
+            del self._signed[name]
+
+    def refuse(self) -> None:
+        """Refuse a column in which it is a comma, or a point that the mapping does not call decimal."""
+        for name in self._signed.keys() & self._whole:
+            cells = self._signed[name]
+            if self._decimal == ',' and cells:
+                raise InvalidData(
+                    f"column '{name}': the comma of '{cells[0]}' seems to separate thousands; save numbers without "
+                    'such commas'
+                )
+            if not self._decimal and len(cells) >= FEW_THOUSANDS:
+                raise InvalidData(
+                    f"column '{name}': the point of '{cells[0]}' may be decimal or separate thousands, as three digits "
+                    "follow each one and other cells have none; write format: {decimal: '.'} if it is decimal, or "
+                    'save numbers without such points'
+                )
 
 
 def _lines(opened: Any, form: FileFormat) -> Iterator[tuple[int, str]]:
