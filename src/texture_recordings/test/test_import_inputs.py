@@ -271,6 +271,10 @@ def coded_by(name: str, codes: Any) -> Write:
     return csv(X, codes, names=f'x,{name}')
 
 
+def numbered(columns: str) -> dict:
+    return {'streams': {'signal': {'columns': [columns], 'time': {'column': 0}}}}
+
+
 UNUSED: dict[str, Any] = {  # what changes in tables of anybody and is none of sensors, trials or runs
     'a contact': np.repeat([0, 1], 300),
     'a contact as text': np.repeat(['True', 'False'], 300),
@@ -331,6 +335,22 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
     'a malformed row among those of sensors without times': (
         text('x,id\n' + lines(np.ravel(np.c_[X, Y]), ['a', 'b'] * N).replace(f'{X[9]},a\n', '?\n')),
         {**RATE, 'rows': {'id': 'a'}}, 'row 20, .*1 cells, 2 are needed: of a malformed row nobody knows',
+    ),
+    **{
+        f'{columns} with columns of {", ".join(content)}': (
+            csv(T, X, [7] * N, [0.5] * N, names='t,x,k,f'),
+            {'streams': {'signal': {'columns': columns, 'time': {'column': 't'}}},
+             'conditions': {'force': {'column': 'f'}}, 'rows': {'k': '7'}, **content}, truth,
+        )
+        for columns, content, truth in (
+            (['*'], {}, CORK), (['*', 'f'], {}, [('cork', np.c_[X, np.full(N, 0.5)])]),
+            (['t', 'x'], {}, "column 't' is a channel under `columns` and is the column under `time`; remove it"),
+            (['x', 'k'], {}, 'is the column under `rows`'),
+            (['*', 'k'], {'rows': {}, 'label': {'column': 'k', 'names': {7: 'cork'}}}, 'is the column under `label`'),
+        )
+    },
+    'numbered columns with that of time': (
+        text(lines(T, X)), {**numbered('0-1'), 'format': {'header': False}}, "'0' is a channel .* under `time`",
     ),
     'an index without a name': (
         csv(range(N), X, names=',x'), {'streams': {'signal': {'columns': ['*'], 'rate_hz': 100.0}}}, CORK,

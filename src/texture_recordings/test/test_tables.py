@@ -16,6 +16,7 @@ from texture_recordings.mapping import TableMapping, load_mapping, mapping_from
 from texture_recordings.readers import MAPPED
 from texture_recordings.tables import ImportReport, import_tables
 
+TIMED = {'streams': {'signal': {'columns': ['x'], 'time': {'column': 't'}}}, 'label': {'value': 'cork'}}
 FIRST_STROKE = 40  # row of the first stroke, after rest
 
 
@@ -134,7 +135,7 @@ def test_losses_and_rows_whose_times_contradict_each_other_are_counted(tmp_path:
         ("['acc_*']", '[acc_x, acc_w]', r"v20.csv': no column 'acc_w'; did you mean 'acc_[xyz]'\?"),
         ('{column: t, unit: ms}', '{column: time, unit: ms}', "no column 'time'"),
         ('{column: t, unit: ms}', '{column: t, unit: s}\n    rate_hz: 100', '0.1 Hz by its times, 100 Hz are'),
-        ("['acc_*']\n    channels: [x, y, z]", '[phase]', "910, first row 3, column 'phase': 'rest' is no"),
+        ("['acc_*']\n    channels: [x, y, z]", '[phase]', "'phase' is a channel .* under `slides`"),
         ('[stroke 1, stroke 2, stroke 3]', '[stroke]', "column 'phase' has none of the values stroke; it has rest"),
         ('{column: material}', '{column: materiel}', "no column 'materiel'; did you mean 'material'"),
         ('.csv', '.dat', "has the form '{day}, {material}, v{speed}.dat'"),
@@ -164,6 +165,11 @@ def test_a_mapping_that_does_not_fit_is_refused_with_the_place(
         ({'slides': {'by': 'label'}}, 'mapping, slides: .* allowed is one of file, column, pause, row'),
         ({'conditions': {'speed': {'unit': 'mph'}}}, "the unit of speed is 'mph'; use one of m/s, cm/s, mm/s"),
         ({'files': '{a}_{a}.csv'}, 'has a field twice'),
+        (
+            {**TIMED, 'conditions': {'force': {'column': 't'}}},
+            "column 't' is under `time` and under `conditions`; name",
+        ),
+        ({**TIMED, 'label': {'column': 't'}}, "column 't' is under `time` and under `label`"),
         ([], 'a mapping of parameter names to values is needed'),
         ({'streams': {'signal': {'columns': ['a'], 'scale': math.inf}}}, "'scale' is inf; allowed is a finite number"),
         ({'streams': {'signal': {'columns': ['a'], 'rate_hz': 10**5000}}}, "'rate_hz' is inf; allowed is 0.0 to"),

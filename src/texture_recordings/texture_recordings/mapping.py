@@ -206,10 +206,26 @@ class TableMapping:
         for name, stream in self.streams.items():
             if not stream.columns:
                 raise InvalidParameter(f"the stream '{name}' has no columns; list their names")
+            if (role := self.roles().get(stream.time.column, 'time')) != 'time':
+                raise InvalidParameter(
+                    f"column '{stream.time.column}' is under `time` and under `{role}`; name another under one of them"
+                )
         if bool(self.label.column) == bool(self.label.value):
             raise InvalidParameter('the label has not one origin; give `column` or `value` under `label`')
         if self.slides.by == 'column' and not self.slides.column:
             raise InvalidParameter('slides end where a column changes, and none is named; give `column` under `slides`')
+
+    def roles(self) -> dict[str, str]:
+        """Return the columns that are no samples by name, with the key that names them."""
+        roles = {
+            **{one.time.column: 'time' for one in self.streams.values()},
+            **{one.column: 'conditions' for one in self.conditions.values()},
+            **dict.fromkeys(self.rows, 'rows'),
+            self.slides.column * (self.slides.by == 'column'): 'slides',
+            self.session: 'session',
+            self.label.column: 'label',
+        }
+        return {name: key for name, key in roles.items() if name}
 
     def texts(self) -> list[str]:
         """Return the names of the columns that are read as texts."""

@@ -83,8 +83,12 @@ class TableFrame:
         return array if array.dtype.kind == 'O' else array.astype(str).astype(object)
 
 
-def chosen(wanted: Sequence[str], names: Sequence[str]) -> list[str]:
-    """Return the columns that names, patterns such as 'taxel*' and ranges such as '0-8' mean, in their order."""
+def chosen(wanted: Sequence[str], names: Sequence[str], other: Mapping[str, str]) -> list[str]:
+    """Return the columns that names, patterns such as 'taxel*' and ranges such as '0-8' mean, in their order.
+
+    Patterns leave out columns that have another key of the mapping; named ones are refused, but those of conditions: a
+    force may be a channel, too.
+    """
     found = []
     for name in wanted:
         match = RANGE.fullmatch(name)
@@ -92,9 +96,14 @@ def chosen(wanted: Sequence[str], names: Sequence[str]) -> list[str]:
         if name not in names and match and 0 <= int(match[3]) - int(match[2]) < MAX_RANGE:
             meant = [f'{match[1]}{number}' for number in range(int(match[2]), int(match[3]) + 1)]
         elif name not in names and len(name) <= 100:
-            meant = [one for one in names if one and fnmatch.fnmatchcase(one, name)] or [name]
+            meant = [one for one in names if one and one not in other and fnmatch.fnmatchcase(one, name)] or [name]
         if unknown := [one for one in meant if one not in names]:
             raise unknown_name(unknown[0], names, 'column')
+        if twice := [one for one in meant if other.get(one, 'conditions') != 'conditions']:
+            raise InvalidData(
+                f"column '{twice[0]}' is a channel under `columns` and is the column under `{other[twice[0]]}`; remove "
+                'it from one of them'
+            )
         found += meant
     return found
 
@@ -229,7 +238,7 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
 
 def _wanted(mapping: TableMapping, names: Sequence[str]) -> tuple[set[str], set[str]]:
     """Return the columns that the mapping wants as numbers, and those of them that are of a condition alone."""
-    samples = {name for one in mapping.streams.values() for name in chosen(one.columns, names)}
+    samples = {name for one in mapping.streams.values() for name in chosen(one.columns, names, mapping.roles())}
     needed = {*samples, *mapping.texts(), *(one.time.column for one in mapping.streams.values())}
     return {*samples, *mapping.numbers()}, {*mapping.numbers()} - needed
 

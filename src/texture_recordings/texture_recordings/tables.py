@@ -244,7 +244,8 @@ class FrameSlides:
         self._mapping, self._report, self._place = mapping, report, frame.place
         self._frame = self._wanted_rows(frame)
         names = [name for name, array in self._frame.columns.items() if array.ndim]
-        self._used = {name: chosen(one.columns, names) for name, one in mapping.streams.items()}
+        other = {**dict.fromkeys(frame.clocks.values(), 'time'), **mapping.roles()}
+        self._used = {name: chosen(one.columns, names, other) for name, one in mapping.streams.items()}
         self._texts = {name: self._frame.texts(name) for name in mapping.texts()}
         numbers = [*(column for columns in self._used.values() for column in columns), *mapping.numbers()]
         self._numbers = {name: self._frame.numbers(name) for name in numbers}
