@@ -180,6 +180,9 @@ def test_rows_of_a_buffer_have_the_rate_of_rows_and_duration(tmp_path: Path, siz
 
 HALVES: Truth = [('cork', X[:300]), ('felt', X[300:])]
 CODES = {'label': {'column': 'l', 'names': {0: 'cork', 1: 'felt'}}, 'slides': {'by': 'column', 'column': 'l'}}
+BOTH = {
+    'streams': {'signal': {'columns': ['x'], 'rate_hz': 100.0}, 'signal_static': {'columns': ['y'], 'rate_hz': 100}}
+}
 PARTS = {**ANY, **RATE, 'files': '{a}_{run}.*', 'tables': 'data/{i}'}
 
 
@@ -227,6 +230,20 @@ LABELS: dict[str, tuple[Write, dict, Truth]] = {
         csv(T, X, ['felt'] * N, names='t,x,material'), {}, "'material' is 'cork' in the name and 'felt' in a column",
     ),
     'a name that equals a column': (csv(T, X, [1] * N, names='t,x,run', name='cork_01.csv'), {}, CORK),
+    **{
+        f'a copy as {name}': (
+            both(csv(T, X), csv(T + 7.0, X, name=f'{name}_2.csv')), {},
+            f"slides '{name}_2.csv/1' and 'cork_1.csv/1' .* have the same samples; a copy is no further slide",
+        )
+        for name in ('cork', 'felt')
+    },
+    'a run twice in a file': (
+        csv(np.r_[T[:300], 9 + T[:300]], np.tile(X[:300], 2)), {'slides': {'by': 'pause'}},
+        "slides 'cork_1.csv/2' and 'cork_1.csv/1'",
+    ),
+    'a stream that is the same and one that is not': (
+        both(csv(X, Y, names='x,y'), csv(X, -Y, names='x,y', name='felt_2.csv')), BOTH, [('cork', X), ('felt', X)],
+    ),
     'a list of labels next to the elements': (grouped, PARTS, "no column 'material'"),
 }  # fmt: skip
 
@@ -780,19 +797,19 @@ def struct_array(path: Path) -> None:
 
 def nested_structs(path: Path) -> None:
     inner = {'acc': ACC, 'material': 'cork'}
-    scipy.io.savemat(path / 'a_1.mat', {'data': {'run1': inner, 'run2': {**inner, 'material': 'felt'}}})
+    scipy.io.savemat(path / 'a_1.mat', {'data': {'run1': inner, 'run2': {'acc': 3 * ACC, 'material': 'felt'}}})
 
 
 def cell_of_structs(path: Path) -> None:
     cells = np.empty(2, object)
-    cells[:] = [{'acc': ACC, 'material': 'cork'}, {'acc': ACC, 'material': 'felt'}]
+    cells[:] = [{'acc': ACC, 'material': 'cork'}, {'acc': 3 * ACC, 'material': 'felt'}]
     scipy.io.savemat(path / 'a_1.mat', {'data': cells})
 
 
 def hdf5_groups(path: Path) -> None:
     with h5py.File(path / 'a_1.h5', 'w') as file:
         for number, material in enumerate(('cork', 'felt'), 1):
-            file[f'data/{number}/acc'], file[f'data/{number}/material'] = ACC, material
+            file[f'data/{number}/acc'], file[f'data/{number}/material'] = number * ACC, material
 
 
 def matlab73_struct_array(path: Path) -> None:
@@ -801,7 +818,7 @@ def matlab73_struct_array(path: Path) -> None:
         for name in ('acc', 'material'):
             file.create_dataset(f'data/{name}', (1, 2), dtype=reference)
         for number, material in enumerate(('cork', 'felt')):
-            file[f'#refs#/a{number}'] = ACC.T
+            file[f'#refs#/a{number}'] = (1 + number) * ACC.T
             text = file.create_dataset(f'#refs#/m{number}', data=np.frombuffer(material.encode(), 'u1').astype('u2'))
             text.attrs['MATLAB_class'] = np.bytes_('char')
             file['data/acc'][0, number] = file[f'#refs#/a{number}'].ref

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import fnmatch
+import hashlib
 import math
 import re
 import unicodedata
@@ -88,12 +89,25 @@ class ImportReport:
     conditions: dict[tuple[str, str], list[float]] = field(default_factory=lambda: defaultdict(list))
     left_out: Counter[str] = field(default_factory=Counter)  # by reason
     examples: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
+    names: dict[bytes, str] = field(default_factory=dict)  # of slides, by the digest of their samples
 
     def leave_out(self, reason: str, count: int, *examples: str) -> None:
         """Count what is left out, with the first places."""
         if count:
             self.left_out[reason] += count
             self.examples[reason] += examples[: EXAMPLES - len(self.examples[reason])]
+
+    def refuse_copy(self, name: str, streams: SlideStreams) -> None:
+        """Refuse a slide that has the samples of one before: in training and test it would be no independent one."""
+        digest = hashlib.sha256()
+        for topic, (signal, _) in streams.items():
+            digest.update(f'{topic} {signal.samples.shape}'.encode() + signal.samples.tobytes())
+        other = self.names.setdefault(digest.digest(), name)
+        if other != name:
+            raise InvalidData(
+                f"the slides '{name}' and '{other}' (file/number of the slide) have the same samples; a copy is no "
+                'further slide, remove one of them, or its row or file'
+            )
 
     def refuse_like_labels(self, names: Mapping[str, str]) -> None:
         """Refuse labels that differ in nothing that a person would tell apart, and that `names` does not name."""
@@ -157,8 +171,9 @@ def import_tables(
         for path, place, fields in progress(_files(mapping, Path(source), kinds, report), 'import files'):
             for frame in frames(path, place, mapping):
                 with placed(frame.place):
-                    for slide in FrameSlides(mapping, _with_fields(frame, fields), report).slides():
-                        bags.write(*slide)
+                    for session, states, streams in FrameSlides(mapping, _with_fields(frame, fields), report).slides():
+                        report.refuse_copy(states[0].exploration_id, streams)
+                        bags.write(session, states, streams)
             if kind_of(path) == 'bag' and is_cut_off(path):
                 report.leave_out(
                     'bags were cut off, and end with their last whole part', 1, f"'{place}'; see mcap recover"
