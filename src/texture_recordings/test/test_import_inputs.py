@@ -278,6 +278,14 @@ def windows(folder: Path) -> None:
     csv(*WINDOWS.T, names=','.join(f'x_{number}' for number in range(40)))(folder)
 
 
+BY_ROW = {'columns': ['X.*'], 'rate_hz': 100.0}
+
+
+def overlapping(size: int, hop: int) -> np.ndarray:
+    """Return windows of two recordings, one in each row."""
+    return np.array([one[at : at + size] for one in (X, Y) for at in range(0, N - size + 1, hop)])
+
+
 def alternating(*names: Any) -> Write:
     count = len(names)
     samples = np.repeat(X, count) * np.tile(1 + np.arange(count), N)
@@ -312,6 +320,21 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
     'windows that are slides': (
         windows, {'streams': {'signal': {**WINDOW, 'samples_per_row': 40}}, 'slides': {'by': 'row'}},
         [('cork', window) for window in WINDOWS],
+    ),
+    **{
+        f'windows of {len(rows[0])} samples every {hop} samples': (
+            npz(X=rows), {**ANY, 'streams': {'signal': {**BY_ROW, 'samples_per_row': len(rows[0])}},
+                          'slides': {'by': 'row'}}, truth,
+        )
+        for hop, rows, truth in (
+            (60, overlapping(300, 60), '10 of 12 slides begin 60 samples behind the one before, with samples that st'),
+            (25, overlapping(50, 25), '44 of 46 slides begin 25 samples behind'),
+            (50, overlapping(50, 50), [('cork', row) for row in overlapping(50, 50)]),
+        )
+    },
+    'trials that overlap': (
+        npz(X=overlapping(50, 20)[..., None]),
+        {**ANY, 'streams': {'signal': BY_ROW}, 'slides': {'by': 'column', 'column': 'trial'}}, 'begin 20 samples beh',
     ),
     'sensors at times of their own': (
         csv(np.ravel(np.c_[T, T + 0.005]).round(4), np.ravel(np.c_[X, Y]), ['a', 'b'] * N, names='t,x,id'), {},

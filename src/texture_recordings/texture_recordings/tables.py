@@ -13,6 +13,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +64,8 @@ SAME_TIME_S = 1e-9
 MAX_NUMBERED = 3  # columns name_1 … name_n beyond this may be samples: the mapping has to tell
 ROWS_A_CODE = 2  # at least, of a column that may name sensors, trials or runs
 MANY_TEXTS = 50  # different ones are no codes
+SHARED, MOST_HOPS = 4, 1000  # samples that windows share at least, and shifts at which they are compared
+OVERLAPPING = 0.25  # share of slides that overlap with the one before by equally many samples
 FLAGS = {'true', 'false', 'yes', 'no', 'on', 'off'}
 CODE_NAME = re.compile(
     r'(?:sensor|finger|trial|run|rep|repeat|repetition|recording|session|pass|stroke)s?[ _-]?(?:id|no|nr|number)?'
@@ -285,6 +288,8 @@ class FrameSlides:
         """Yield what `SlideBags.write` takes."""
         params, reference, short, inside = self._mapping.slides, self._reference, 0, 0
         times = reference.rows / reference.rate_hz if reference.time_s is None else reference.time_s
+        before: AnyArray = np.empty(0)
+        hops = Counter[int]()
         for number, span in enumerate(self._spans, 1):
             rows = span.stop - span.start
             inside += rows
@@ -293,7 +298,18 @@ class FrameSlides:
                 where = f"'{self._place}', row {self._line(span.start)}: {rows * reference.per_row} samples"
                 self._report.leave_out('slides are too short', 1, where)
                 continue
-            yield self._slide(times, span, number)
+            slide = self._slide(times, span, number)
+            samples = next(iter(slide[2].values()))[0].samples
+            hops[_hop(before, samples)] += 1
+            before = samples
+            yield slide
+        hop, count = max(((hop, count) for hop, count in hops.items() if hop), default=(0, 0), key=itemgetter(1))
+        if count and count >= OVERLAPPING * (hops.total() - 1):
+            raise InvalidData(
+                f'{count} of {hops.total()} slides begin {hop} samples behind the one before, with samples that stand '
+                'in it: they are windows of one recording and no independent slides; give whole recordings as slides, '
+                'which are cut into windows later'
+            )
         if short > MAX_LEFT_OUT * inside and short < inside and params.min_s == type(params).min_s:
             raise InvalidData(
                 f'{short} of {inside} rows lie in slides that are shorter than {params.min_s:g} s; look at `slides` in '
@@ -666,6 +682,17 @@ class FrameSlides:
         values = np.abs(values) if name == 'speed' else values
         mean = float(values.mean()) if len(values) else math.nan
         return abs(mean) if name == 'force' else mean
+
+
+def _hop(before: AnyArray, after: AnyArray) -> int:
+    """Return how many samples behind the begin of a window the next one begins, 0 if they do not overlap."""
+    if before.shape == after.shape:
+        begins = (before == after[0]).all(axis=1) & (before[-1] == after[::-1]).all(axis=1)
+        for hop in np.flatnonzero(begins[: 1 - SHARED])[:MOST_HOPS].tolist():
+            shared = before[hop:]
+            if hop and (shared != shared[0]).any() and np.array_equal(shared, after[: len(shared)]):
+                return int(hop)
+    return 0
 
 
 def _is_one_of(text: str, wanted: Sequence[str]) -> bool:
