@@ -169,6 +169,17 @@ def test_a_mapping_that_does_not_fit_is_refused_with_the_place(
             {**TIMED, 'conditions': {'force': {'column': 't'}}},
             "column 't' is under `time` and under `conditions`; name",
         ),
+        *(
+            ({'streams': {'signal': {'columns': ['x'], 'time': time}}}, f'names {unit}, .*; write unit: {unit}, or')
+            for unit, time in (
+                ('ms', {'column': 't_ms'}),
+                ('us', {'column': 'Time [µs]', 'unit': 'ms'}),
+                ('s', {'column': 'time_s', 'unit': 'ms'}),
+                ('ns', {'column': '/imu/stamp.nsec', 'unit': 'us'}),
+                ('ms', {'column': 'clock (ms)', 'unit': 'min'}),
+                ('s', {'column': 'T_S', 'unit': 'us'}),
+            )
+        ),
         ({**TIMED, 'label': {'column': 't'}}, "column 't' is under `time` and under `label`"),
         ([], 'a mapping of parameter names to values is needed'),
         ({'streams': {'signal': {'columns': ['a'], 'scale': math.inf}}}, "'scale' is inf; allowed is a finite number"),
@@ -191,6 +202,13 @@ def test_a_column_in_braces_and_whole_numbers_are_names() -> None:
     mapping = mapping_from({'streams': {'signal': {'columns': [0, 1, '3-5']}}, 'label': {'value': 7}})
     assert mapping.streams['signal'].columns == ['0', '1', '3-5']
     assert mapping.label.value == '7'
+
+
+@pytest.mark.parametrize('column', ['t', 'times', 'items', '_', 'ms', 't_ms2', 'tMs', 'time (s) UTC'])
+def test_a_column_of_time_whose_name_has_no_unit_has_that_of_the_mapping(column: str) -> None:
+    time = {'column': column, 'unit': 'us'}
+    mapping = mapping_from({'streams': {'signal': {'columns': ['x'], 'time': time}}, 'label': {'value': 'cork'}})
+    assert mapping.streams['signal'].time.unit == 'us'
 
 
 def test_an_import_that_fails_leaves_no_half_of_it(tmp_path: Path, mapping: TableMapping) -> None:

@@ -47,6 +47,12 @@ def template_fields(template: str, name: str) -> dict[str, str] | None:
 
 
 TIME_UNITS: Mapping[str, float] = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'min': 60.0}
+# How names of columns end that name their unit: t_ms, 't (s)', 'time [us]'; in the order of TIME_UNITS.
+UNIT_IN_NAME = re.compile(
+    r'.*(?:[_. ]|[(\[] ?)(?:(s|sec|seconds?)|(ms|msec|milliseconds?)|([uµμ]s|usec|microseconds?)|(ns|nsec|nanoseconds?)'
+    r'|(min|minutes?)) ?[)\]]?',
+    re.IGNORECASE,
+)
 BORDERS = ('file', 'column', 'pause', 'row')
 
 
@@ -84,6 +90,15 @@ class TimeColumn:
 
     column: str = param('', "Names the column of time; '' takes rows as evenly spaced at `rate_hz`.")
     unit: str = param('s', 'Names the unit of the column of time.', choices=tuple(TIME_UNITS))
+
+    def __post_init__(self) -> None:
+        if named := UNIT_IN_NAME.fullmatch(self.column):
+            unit = next(unit for unit, text in zip(TIME_UNITS, named.groups(), strict=True) if text)
+            if unit != self.unit:
+                raise InvalidParameter(
+                    f"column '{self.column}' under `time` names {unit}, and its unit is {self.unit}; write unit: {unit}, or "
+                    'rename the column if its name is wrong'
+                )
 
 
 @dataclass(frozen=True)
