@@ -201,6 +201,16 @@ LABELS: dict[str, tuple[Write, dict, Truth]] = {
     'codes 0.0 and 1.0': (coded(['0.0'] * 300 + ['1.0'] * 300), CODES, HALVES),
     'codes of savetxt': (coded(['0.000e+00'] * 300 + ['1.000e+00'] * 300), CODES, HALVES),
     'a code without a name': (coded(np.repeat([1, 2], 300)), CODES, 'the label 2 has no name; it is none of 0, 1'),
+    'codes without names': (
+        coded(np.repeat([0, 1], 300)), {**CODES, 'label': {'column': 'l'}},
+        r'the label 0 has no name; it is none of the codes under `names`; write names: \{0: NAME\} under `label`',
+    ),
+    'a code beside names': (
+        coded(['cork'] * 300 + ['1'] * 300), {**CODES, 'label': {'column': 'l', 'names': {'cork': 'oak'}}}, 'the label 1 ',
+    ),
+    'a field that is the number of the run': (csv(T, X), {'label': {'column': 'run'}}, 'the label 1 has no name'),
+    'a field with a name': (csv(T, X), {'label': {'column': 'run', 'names': {1: 'cork'}}}, CORK),
+    'a number that the mapping itself gives': (csv(T, X), {'label': {'value': 7}}, [('7', X)]),
     'a code with an underscore': (
         coded(['1_0'] * 300 + ['10'] * 300),
         {**CODES, 'label': {'column': 'l', 'names': {10: 'felt'}}}, [('1_0', X[:300]), ('felt', X[300:])],

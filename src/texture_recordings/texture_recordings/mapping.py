@@ -96,8 +96,8 @@ class TimeColumn:
             unit = next(unit for unit, text in zip(TIME_UNITS, named.groups(), strict=True) if text)
             if unit != self.unit:
                 raise InvalidParameter(
-                    f"column '{self.column}' under `time` names {unit}, and its unit is {self.unit}; write unit: {unit}, or "
-                    'rename the column if its name is wrong'
+                    f"column '{self.column}' under `time` names {unit}, and its unit is {self.unit}; write unit: {unit}, "
+                    'or rename the column if its name is wrong'
                 )
 
 

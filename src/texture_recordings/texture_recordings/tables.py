@@ -578,7 +578,7 @@ class FrameSlides:
 
     def _slide(self, times: Array, rows: slice, number: int) -> tuple[str, list[ExplorationState], SlideStreams]:
         label, reference = self._mapping.label, self._reference
-        surface = checked_label(self._named(label.value or self._value(label.column, rows, 'label')))
+        surface = checked_label(label.value or self._named(self._value(label.column, rows, 'label')))
         if not surface:
             raise InvalidData('a slide has an empty label; name another column under `label`')
         session = self._value(self._mapping.session, rows, 'session') if self._mapping.session else surface
@@ -607,10 +607,11 @@ class FrameSlides:
         names = self._mapping.label.names
         number = number_of(code)
         same = [code] if code in names else [one for one in names if number_of(one) == number]
-        if not same and names and math.isfinite(number) and all(math.isfinite(number_of(one)) for one in names):
+        if not same and math.isfinite(number):
             raise InvalidData(
-                f'the label {code} has no name; it is none of {", ".join(names)} under `names`; add it, or leave its '
-                'rows out by `values` under `slides`'
+                f'the label {code} has no name; it is none of {", ".join(names) or "the codes"} under `names`; write '
+                f'names: {{{code}: NAME}} under `label`, name another column, or leave its rows out by `values` under '
+                '`slides`'
             )
         return names[same[0]] if same else code
 
