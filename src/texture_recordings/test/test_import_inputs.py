@@ -346,6 +346,22 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
         npz(X=overlapping(50, 20)[..., None]),
         {**ANY, 'streams': {'signal': BY_ROW}, 'slides': {'by': 'column', 'column': 'trial'}}, 'begin 20 samples beh',
     ),
+    'a slide that stands still': (
+        both(csv(T, X), csv(T, [1.5] * N, name='felt_1.csv')), {}, CORK,
+    ),
+    'a stream that stands still': (csv(X, [1.5] * N, names='x,y'), BOTH, "1 slides in which no channel of 'signal_stat"),
+    'no slide that changes': (
+        csv(T, [1.5] * 100 + [''] + [1.5] * 499), {}, "with samples that change .*: 1 slides in which no channel of 'sig",
+    ),
+    'rows that stand still': (
+        npz(X=np.r_[WINDOWS, np.ones((2, 40)) * [[1], [2]]]),
+        {**ANY, 'streams': {'signal': {**BY_ROW, 'samples_per_row': 40}}, 'slides': {'by': 'row'}},
+        [('cork', window) for window in WINDOWS],
+    ),
+    'a channel that stands still': (
+        csv(X, [1.5] * N, names='x,y'), {'streams': {'signal': {'columns': ['x', 'y'], 'rate_hz': 100.0}}},
+        [('cork', np.c_[X, [1.5] * N])],
+    ),
     'sensors at times of their own': (
         csv(np.ravel(np.c_[T, T + 0.005]).round(4), np.ravel(np.c_[X, Y]), ['a', 'b'] * N, names='t,x,id'), {},
         r"'id': it changes from 'a' to 'b' within a slide.*rows: \{id: 'a'\}",

@@ -182,6 +182,7 @@ def test_a_mapping_that_does_not_fit_is_refused_with_the_place(
         ),
         ({**TIMED, 'label': {'column': 't'}}, "column 't' is under `time` and under `label`"),
         ([], 'a mapping of parameter names to values is needed'),
+        ({'streams': {'signal': {'columns': ['a'], 'scale': 0}}}, "'scale' is 0, by which all samples are 0; write"),
         ({'streams': {'signal': {'columns': ['a'], 'scale': math.inf}}}, "'scale' is inf; allowed is a finite number"),
         ({'streams': {'signal': {'columns': ['a'], 'rate_hz': 10**5000}}}, "'rate_hz' is inf; allowed is 0.0 to"),
     ],

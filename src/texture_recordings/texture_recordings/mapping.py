@@ -96,7 +96,7 @@ class TimeColumn:
             unit = next(unit for unit, text in zip(TIME_UNITS, named.groups(), strict=True) if text)
             if unit != self.unit:
                 raise InvalidParameter(
-                    f"column '{self.column}' under `time` names {unit}, and its unit is {self.unit}; write unit: {unit}, "
+                    f"column '{self.column}' under `time` names {unit}, its unit is {self.unit}; write unit: {unit}, "
                     'or rename the column if its name is wrong'
                 )
 
@@ -124,6 +124,12 @@ class StreamColumns:
         high=1_000_000,
     )
     time: TimeColumn = field(default_factory=TimeColumn)
+
+    def __post_init__(self) -> None:
+        if not self.scale:
+            raise InvalidParameter(
+                "parameter 'scale' is 0, by which all samples are 0; write another factor, such as 1"
+            )
 
 
 @dataclass(frozen=True)

@@ -183,9 +183,10 @@ def import_tables(
                 )
         report.refuse_like_labels(mapping.label.names)
         if not report.slides:
+            left = [f'{count} {reason}' for reason, count in report.left_out.items() if reason.startswith('slides')]
             raise InvalidData(
-                f"no slide of {mapping.slides.min_s:g} s or more in '{source}': "
-                f'{report.left_out["slides are too short"]} are shorter; look at `slides` in the mapping'
+                f"no slide of {mapping.slides.min_s:g} s or more with samples that change in '{source}': "
+                f'{", ".join(left)}; look at `slides` and at `columns` in the mapping'
             )
     report.bags = bags.paths
     return report
@@ -254,6 +255,11 @@ class Stream:
     rate_hz: float = 0.0  # of rows
     burst_s: float = 0.0
 
+    @property
+    def at_s(self) -> Array:
+        """Times of the rows, by their number where there are no others."""
+        return self.rows / self.rate_hz if self.time_s is None else self.time_s
+
 
 class FrameSlides:
     """The slides of one frame."""
@@ -287,18 +293,23 @@ class FrameSlides:
     def slides(self) -> Iterator[tuple[str, list[ExplorationState], SlideStreams]]:
         """Yield what `SlideBags.write` takes."""
         params, reference, short, inside = self._mapping.slides, self._reference, 0, 0
-        times = reference.rows / reference.rate_hz if reference.time_s is None else reference.time_s
+        times = reference.at_s
         before: AnyArray = np.empty(0)
         hops = Counter[int]()
         for number, span in enumerate(self._spans, 1):
             rows = span.stop - span.start
             inside += rows
+            where = f"'{self._place}', row {self._line(reference.rows[span.start])}"
             if rows * reference.per_row < 2 or rows / reference.rate_hz < params.min_s - 1e-9:
                 short += rows
-                where = f"'{self._place}', row {self._line(span.start)}: {rows * reference.per_row} samples"
-                self._report.leave_out('slides are too short', 1, where)
+                self._report.leave_out('slides are too short', 1, f'{where}: {rows * reference.per_row} samples')
                 continue
-            slide = self._slide(times, span, number)
+            span_s = float(times[span].min()), float(times[span].max()) + 1.0 / reference.rate_hz
+            still = [one.name for one in self._streams if not _changes(one, self._within(one, span, span_s))]
+            if still:
+                self._report.leave_out(f"slides in which no channel of '{still[0]}' changes", 1, where)
+                continue
+            slide = self._slide(span, span_s, number)
             samples = next(iter(slide[2].values()))[0].samples
             hops[_hop(before, samples)] += 1
             before = samples
@@ -576,20 +587,20 @@ class FrameSlides:
             )  # fmt: skip
         return first
 
-    def _slide(self, times: Array, rows: slice, number: int) -> tuple[str, list[ExplorationState], SlideStreams]:
-        label, reference = self._mapping.label, self._reference
+    def _slide(
+        self, rows: slice, span_s: tuple[float, float], number: int
+    ) -> tuple[str, list[ExplorationState], SlideStreams]:
+        label, (begin_s, end_s) = self._mapping.label, span_s
         surface = checked_label(label.value or self._named(self._value(label.column, rows, 'label')))
         if not surface:
             raise InvalidData('a slide has an empty label; name another column under `label`')
         session = self._value(self._mapping.session, rows, 'session') if self._mapping.session else surface
-        begin_s, end_s = float(times[rows].min()), float(times[rows].max()) + 1.0 / reference.rate_hz
         if end_s - begin_s > LONGEST_SLIDE_S:
             raise InvalidData(
-                f'row {self._line(reference.rows[rows.start])}: a slide lasts {end_s - begin_s:.4g} s, at most '
+                f'row {self._line(self._reference.rows[rows.start])}: a slide lasts {end_s - begin_s:.4g} s, at most '
                 f'{LONGEST_SLIDE_S:g} s are plausible; look at the column of time, its unit and `slides`'
             )
-        streams = {one.name: self._samples(one, surface, self._frame_rows(rows), begin_s, end_s)
-                   for one in self._streams}  # fmt: skip
+        streams = {one.name: self._samples(one, surface, rows, span_s) for one in self._streams}
         self._report.with_nan += any(np.isnan(signal.samples).any() for signal, _ in streams.values())
         known: dict[str, Any] = {}
         for name, column in CONDITION_COLUMNS.items():
@@ -615,28 +626,34 @@ class FrameSlides:
             )
         return names[same[0]] if same else code
 
+    def _within(self, stream: Stream, span: slice, span_s: tuple[float, float]) -> slice:
+        """Return the rows of a stream in a slide of the reference."""
+        if stream.group == self._reference.group:
+            first, last = np.searchsorted(stream.rows, self._frame_rows(span))
+        else:
+            first, last = np.searchsorted(stream.at_s, np.subtract(span_s, SAME_TIME_S))
+        if first == last:
+            raise InvalidData(
+                f"no samples of '{stream.name}' from {span_s[0]:g} to {span_s[1]:g} s of a slide; look at the times of "
+                'the streams'
+            )
+        return slice(int(first), int(last))
+
     def _samples(
-        self, stream: Stream, surface: str, frame_rows: tuple[int, int], begin_s: float, end_s: float
+        self, stream: Stream, surface: str, span: slice, span_s: tuple[float, float]
     ) -> tuple[TactileSignal, AnyArray]:
         """Return the samples of a slide, and their places on the grid."""
-        at = stream.rows / stream.rate_hz if stream.time_s is None else stream.time_s
-        if stream.group == self._reference.group:
-            first, last = np.searchsorted(stream.rows, frame_rows)
-        else:
-            first, last = np.searchsorted(at, (begin_s - SAME_TIME_S, end_s - SAME_TIME_S))
-        samples = stream.samples[first:last]
-        if not len(samples):
-            span = f'{begin_s:g} to {end_s:g} s'
-            raise InvalidData(f"no samples of '{stream.name}' from {span} of a slide; look at the times of the streams")
+        within = self._within(stream, span, span_s)
+        samples = stream.samples[within]
         rows: AnyArray = np.arange(len(samples))
         index, counts = rows, Counter(samples=len(samples))
         if stream.time_s is not None and len(samples) > 1:
             try:
                 rows, index, counts = on_grid(
-                    samples, at[first:last], stream.rate_hz, stream.burst_s, stated=stream.params.rate_hz > 0
+                    samples, stream.at_s[within], stream.rate_hz, stream.burst_s, stated=stream.params.rate_hz > 0
                 )
             except ClockFault as fault:
-                raise self._fault(stream.clock, stream.rows[first + fault.row], fault) from fault
+                raise self._fault(stream.clock, stream.rows[within.start + fault.row], fault) from fault
         for reason, left in counts.items():
             if reason in ('samples', 'lost'):
                 self._report.streams[surface, stream.name][reason] += stream.per_row * left
@@ -683,6 +700,14 @@ class FrameSlides:
         values = np.abs(values) if name == 'speed' else values
         mean = float(values.mean()) if len(values) else math.nan
         return abs(mean) if name == 'force' else mean
+
+
+def _changes(stream: Stream, within: slice) -> bool:
+    """Return whether a channel changes within some rows, or one sample is all there is."""
+    samples = stream.samples[within]
+    known = samples[np.isfinite(samples).all(axis=1)]
+    channels = known.reshape(len(known), -1, stream.per_row)
+    return known.size < 2 * len(stream.channels) or bool((channels != channels[:1, :, :1]).any())
 
 
 def _hop(before: AnyArray, after: AnyArray) -> int:
