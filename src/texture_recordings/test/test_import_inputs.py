@@ -351,7 +351,7 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
     ),
     'a stream that stands still': (csv(X, [1.5] * N, names='x,y'), BOTH, "1 slides in which no channel of 'signal_stat"),
     'no slide that changes': (
-        csv(T, [1.5] * 100 + [''] + [1.5] * 499), {}, "with samples that change .*: 1 slides in which no channel of 'sig",
+        csv(T, [1.5] * 100 + [''] + [1.5] * 499), {}, 'with samples that change .*: 1 slides in which no ch',
     ),
     'rows that stand still': (
         npz(X=np.r_[WINDOWS, np.ones((2, 40)) * [[1], [2]]]),
@@ -465,6 +465,17 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
         csv(['#N/A' if np.isnan(x) else x for x in MISSING], Y, names='x,y'), RATE, [('cork', MISSING)],
     ),
     'an underscore': (csv([*X[:100], '1_000', *X[101:200], '-', *X[201:]], names='x'), RATE, [('cork', MISSING)]),
+    **{
+        f'a first row of numbers by {form}': (
+            text('# logger\n7,8\n' + lines(range(N), X)),
+            {'streams': {'signal': {'columns': [1], 'rate_hz': 100.0}}, 'format': form}, truth,
+        )
+        for form, truth in (
+            ({}, r'row is 7, 8, which are numbers .*\{header: false, skip_rows: 2\} if they are names: columns then'),
+            ({'header': False}, [('cork', np.r_[8, X])]), ({'header': False, 'skip_rows': 2}, CORK),
+        )
+    },
+    'a first row of one number': (text(lines([5, *X])), RATE, 'the first row is 5, which are numbers'),
     'no header': (text(lines(X, Y)), {'streams': {'signal': {'columns': ['*'], 'rate_hz': 100.0}}}, 'no names; write'),
     'commas decimal and delimiters': (
         text('n,x,y\n' + lines(range(N), [f'{x:.4f}'.replace('.', ',') for x in X])), RATE, "'y' holds digits such as",

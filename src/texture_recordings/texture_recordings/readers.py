@@ -266,11 +266,11 @@ def _opened(opened: Any, form: FileFormat) -> tuple[Iterator[tuple[int, str]], s
     rest = _lines(opened, form)
     first = next(rest, (0, ''))
     delimiter = form.delimiter or next((one for one in DELIMITERS if one in first[1]), ',')
-    names = _names(_cells(first[1], delimiter), form)
+    names = _names(_cells(first[1], delimiter), form, first[0])
     return rest if form.header else chain([first], rest), delimiter, names
 
 
-def _names(cells: Sequence[str], form: FileFormat) -> list[str]:
+def _names(cells: Sequence[str], form: FileFormat, line: int) -> list[str]:
     """Return the names of the columns by the first row."""
     if cells == ['']:
         raise InvalidData('it is empty, or has comments only; choose files with samples')
@@ -283,12 +283,11 @@ def _names(cells: Sequence[str], form: FileFormat) -> list[str]:
     twice = [name for name in cells if cells.count(name) > 1]
     if twice:
         raise InvalidData(f"it has the column '{twice[0]}' twice; give each column a different name")
-    values = np.array([number_of(name) for name in cells])
-    counted = all(name.isdigit() for name in cells) and (np.diff(values) == 1).all()
-    if np.isfinite(values).all() and not counted:
+    if np.isfinite([number_of(name) for name in cells]).all():
         raise InvalidData(
             f'the first row is {", ".join(cells[:3])[:60]}, which are numbers and no names; write '
-            'format: {header: false}, or skip fewer rows'
+            f'format: {{header: false}} if they are samples, and format: {{header: false, skip_rows: {line}}} if they '
+            'are names: columns then count from 0'
         )
     return list(cells)
 
