@@ -206,7 +206,7 @@ LABELS: dict[str, tuple[Write, dict, Truth]] = {
         r'the label 0 has no name; it is none of the codes under `names`; write names: \{0: NAME\} under `label`',
     ),
     'a code beside names': (
-        coded(['cork'] * 300 + ['1'] * 300), {**CODES, 'label': {'column': 'l', 'names': {'cork': 'oak'}}}, 'the label 1 ',
+        coded(['cork'] * 300 + ['1'] * 300), {**CODES, 'label': {'column': 'l', 'names': {'cork': 'oak'}}}, 'label 1 ',
     ),
     'a field that is the number of the run': (csv(T, X), {'label': {'column': 'run'}}, 'the label 1 has no name'),
     'a field with a name': (csv(T, X), {'label': {'column': 'run', 'names': {1: 'cork'}}}, CORK),
@@ -349,7 +349,7 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
     'a slide that stands still': (
         both(csv(T, X), csv(T, [1.5] * N, name='felt_1.csv')), {}, CORK,
     ),
-    'a stream that stands still': (csv(X, [1.5] * N, names='x,y'), BOTH, "1 slides in which no channel of 'signal_stat"),
+    'a stream that stands still': (csv(X, [1.5] * N, names='x,y'), BOTH, "no channel of 'signal_static' changes"),
     'no slide that changes': (
         csv(T, [1.5] * 100 + [''] + [1.5] * 499), {}, 'with samples that change .*: 1 slides in which no ch',
     ),

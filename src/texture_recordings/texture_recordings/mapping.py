@@ -106,7 +106,9 @@ class StreamColumns:
     """The columns of one stream: `signal` for vibration, `signal_static` for slow channels."""
 
     columns: list[str] = param(  # noqa: RUF009 – it gives a field
-        [], "Names the columns in their order: names, patterns ('taxel*') or ranges ('0-8', 'acc.1-3')."
+        [],
+        "Names the columns in their order: names, patterns ('taxel*') or ranges ('0-8', 'acc.1-3'); patterns leave out "
+        'columns that another key names.',
     )
     channels: list[str] = param(  # noqa: RUF009 – it gives a field
         [], 'Names the channels in the bag; [] takes the names of the columns.'
