@@ -180,6 +180,9 @@ def test_rows_of_a_buffer_have_the_rate_of_rows_and_duration(tmp_path: Path, siz
 
 HALVES: Truth = [('cork', X[:300]), ('felt', X[300:])]
 CODES = {'label': {'column': 'l', 'names': {0: 'cork', 1: 'felt'}}, 'slides': {'by': 'column', 'column': 'l'}}
+BOTH = {
+    'streams': {'signal': {'columns': ['x'], 'rate_hz': 100.0}, 'signal_static': {'columns': ['y'], 'rate_hz': 100}}
+}
 PARTS = {**ANY, **RATE, 'files': '{a}_{run}.*', 'tables': 'data/{i}'}
 
 
@@ -198,6 +201,16 @@ LABELS: dict[str, tuple[Write, dict, Truth]] = {
     'codes 0.0 and 1.0': (coded(['0.0'] * 300 + ['1.0'] * 300), CODES, HALVES),
     'codes of savetxt': (coded(['0.000e+00'] * 300 + ['1.000e+00'] * 300), CODES, HALVES),
     'a code without a name': (coded(np.repeat([1, 2], 300)), CODES, 'the label 2 has no name; it is none of 0, 1'),
+    'codes without names': (
+        coded(np.repeat([0, 1], 300)), {**CODES, 'label': {'column': 'l'}},
+        r'the label 0 has no name; it is none of the codes under `names`; write names: \{0: NAME\} under `label`',
+    ),
+    'a code beside names': (
+        coded(['cork'] * 300 + ['1'] * 300), {**CODES, 'label': {'column': 'l', 'names': {'cork': 'oak'}}}, 'label 1 ',
+    ),
+    'a field that is the number of the run': (csv(T, X), {'label': {'column': 'run'}}, 'the label 1 has no name'),
+    'a field with a name': (csv(T, X), {'label': {'column': 'run', 'names': {1: 'cork'}}}, CORK),
+    'a number that the mapping itself gives': (csv(T, X), {'label': {'value': 7}}, [('7', X)]),
     'a code with an underscore': (
         coded(['1_0'] * 300 + ['10'] * 300),
         {**CODES, 'label': {'column': 'l', 'names': {10: 'felt'}}}, [('1_0', X[:300]), ('felt', X[300:])],
@@ -227,6 +240,20 @@ LABELS: dict[str, tuple[Write, dict, Truth]] = {
         csv(T, X, ['felt'] * N, names='t,x,material'), {}, "'material' is 'cork' in the name and 'felt' in a column",
     ),
     'a name that equals a column': (csv(T, X, [1] * N, names='t,x,run', name='cork_01.csv'), {}, CORK),
+    **{
+        f'a copy as {name}': (
+            both(csv(T, X), csv(T + 7.0, X, name=f'{name}_2.csv')), {},
+            f"slides '{name}_2.csv/1' and 'cork_1.csv/1' .* have the same samples; a copy is no further slide",
+        )
+        for name in ('cork', 'felt')
+    },
+    'a run twice in a file': (
+        csv(np.r_[T[:300], 9 + T[:300]], np.tile(X[:300], 2)), {'slides': {'by': 'pause'}},
+        "slides 'cork_1.csv/2' and 'cork_1.csv/1'",
+    ),
+    'a stream that is the same and one that is not': (
+        both(csv(X, Y, names='x,y'), csv(X, -Y, names='x,y', name='felt_2.csv')), BOTH, [('cork', X), ('felt', X)],
+    ),
     'a list of labels next to the elements': (grouped, PARTS, "no column 'material'"),
 }  # fmt: skip
 
@@ -250,6 +277,7 @@ MISSING = X.copy()
 MISSING[[100, 200]] = np.nan
 PAC = {'columns': ['pac_*'], 'rate_hz': 1200.0}
 THOUSANDS = [f'{value:,}' for value in np.round(2000 * X).astype(int).tolist()]
+POINTS = [value.replace(',', '.') for value in THOUSANDS]
 GERMAN = {'format': {'delimiter': ';', 'decimal': ','}, **RATE}
 TWICE = {'signal': {'columns': ['x'], 'rate_hz': 100.0}, 'signal_static': {'columns': ['y'], 'rate_hz': 10.0}}
 WINDOWS = np.random.default_rng(0).normal(size=(30, 40)).round(3)
@@ -260,6 +288,14 @@ def windows(folder: Path) -> None:
     csv(*WINDOWS.T, names=','.join(f'x_{number}' for number in range(40)))(folder)
 
 
+BY_ROW = {'columns': ['X.*'], 'rate_hz': 100.0}
+
+
+def overlapping(size: int, hop: int) -> np.ndarray:
+    """Return windows of two recordings, one in each row."""
+    return np.array([one[at : at + size] for one in (X, Y) for at in range(0, N - size + 1, hop)])
+
+
 def alternating(*names: Any) -> Write:
     count = len(names)
     samples = np.repeat(X, count) * np.tile(1 + np.arange(count), N)
@@ -268,6 +304,10 @@ def alternating(*names: Any) -> Write:
 
 def coded_by(name: str, codes: Any) -> Write:
     return csv(X, codes, names=f'x,{name}')
+
+
+def numbered(columns: str) -> dict:
+    return {'streams': {'signal': {'columns': [columns], 'time': {'column': 0}}}}
 
 
 UNUSED: dict[str, Any] = {  # what changes in tables of anybody and is none of sensors, trials or runs
@@ -290,6 +330,37 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
     'windows that are slides': (
         windows, {'streams': {'signal': {**WINDOW, 'samples_per_row': 40}}, 'slides': {'by': 'row'}},
         [('cork', window) for window in WINDOWS],
+    ),
+    **{
+        f'windows of {len(rows[0])} samples every {hop} samples': (
+            npz(X=rows), {**ANY, 'streams': {'signal': {**BY_ROW, 'samples_per_row': len(rows[0])}},
+                          'slides': {'by': 'row'}}, truth,
+        )
+        for hop, rows, truth in (
+            (60, overlapping(300, 60), '10 of 12 slides begin 60 samples behind the one before, with samples that st'),
+            (25, overlapping(50, 25), '44 of 46 slides begin 25 samples behind'),
+            (50, overlapping(50, 50), [('cork', row) for row in overlapping(50, 50)]),
+        )
+    },
+    'trials that overlap': (
+        npz(X=overlapping(50, 20)[..., None]),
+        {**ANY, 'streams': {'signal': BY_ROW}, 'slides': {'by': 'column', 'column': 'trial'}}, 'begin 20 samples beh',
+    ),
+    'a slide that stands still': (
+        both(csv(T, X), csv(T, [1.5] * N, name='felt_1.csv')), {}, CORK,
+    ),
+    'a stream that stands still': (csv(X, [1.5] * N, names='x,y'), BOTH, "no channel of 'signal_static' changes"),
+    'no slide that changes': (
+        csv(T, [1.5] * 100 + [''] + [1.5] * 499), {}, 'with samples that change .*: 1 slides in which no ch',
+    ),
+    'rows that stand still': (
+        npz(X=np.r_[WINDOWS, np.ones((2, 40)) * [[1], [2]]]),
+        {**ANY, 'streams': {'signal': {**BY_ROW, 'samples_per_row': 40}}, 'slides': {'by': 'row'}},
+        [('cork', window) for window in WINDOWS],
+    ),
+    'a channel that stands still': (
+        csv(X, [1.5] * N, names='x,y'), {'streams': {'signal': {'columns': ['x', 'y'], 'rate_hz': 100.0}}},
+        [('cork', np.c_[X, [1.5] * N])],
     ),
     'sensors at times of their own': (
         csv(np.ravel(np.c_[T, T + 0.005]).round(4), np.ravel(np.c_[X, Y]), ['a', 'b'] * N, names='t,x,id'), {},
@@ -330,6 +401,22 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
     'a malformed row among those of sensors without times': (
         text('x,id\n' + lines(np.ravel(np.c_[X, Y]), ['a', 'b'] * N).replace(f'{X[9]},a\n', '?\n')),
         {**RATE, 'rows': {'id': 'a'}}, 'row 20, .*1 cells, 2 are needed: of a malformed row nobody knows',
+    ),
+    **{
+        f'{columns} with columns of {", ".join(content)}': (
+            csv(T, X, [7] * N, [0.5] * N, names='t,x,k,f'),
+            {'streams': {'signal': {'columns': columns, 'time': {'column': 't'}}},
+             'conditions': {'force': {'column': 'f'}}, 'rows': {'k': '7'}, **content}, truth,
+        )
+        for columns, content, truth in (
+            (['*'], {}, CORK), (['*', 'f'], {}, [('cork', np.c_[X, np.full(N, 0.5)])]),
+            (['t', 'x'], {}, "column 't' is a channel under `columns` and is the column under `time`; remove it"),
+            (['x', 'k'], {}, 'is the column under `rows`'),
+            (['*', 'k'], {'rows': {}, 'label': {'column': 'k', 'names': {7: 'cork'}}}, 'is the column under `label`'),
+        )
+    },
+    'numbered columns with that of time': (
+        text(lines(T, X)), {**numbered('0-1'), 'format': {'header': False}}, "'0' is a channel .* under `time`",
     ),
     'an index without a name': (
         csv(range(N), X, names=',x'), {'streams': {'signal': {'columns': ['*'], 'rate_hz': 100.0}}}, CORK,
@@ -378,6 +465,17 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
         csv(['#N/A' if np.isnan(x) else x for x in MISSING], Y, names='x,y'), RATE, [('cork', MISSING)],
     ),
     'an underscore': (csv([*X[:100], '1_000', *X[101:200], '-', *X[201:]], names='x'), RATE, [('cork', MISSING)]),
+    **{
+        f'a first row of numbers by {form}': (
+            text('# logger\n7,8\n' + lines(range(N), X)),
+            {'streams': {'signal': {'columns': [1], 'rate_hz': 100.0}}, 'format': form}, truth,
+        )
+        for form, truth in (
+            ({}, r'row is 7, 8, which are numbers .*\{header: false, skip_rows: 2\} if they are names: columns then'),
+            ({'header': False}, [('cork', np.r_[8, X])]), ({'header': False, 'skip_rows': 2}, CORK),
+        )
+    },
+    'a first row of one number': (text(lines([5, *X])), RATE, 'the first row is 5, which are numbers'),
     'no header': (text(lines(X, Y)), {'streams': {'signal': {'columns': ['*'], 'rate_hz': 100.0}}}, 'no names; write'),
     'commas decimal and delimiters': (
         text('n,x,y\n' + lines(range(N), [f'{x:.4f}'.replace('.', ',') for x in X])), RATE, "'y' holds digits such as",
@@ -394,6 +492,24 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
     'commas of thousands': (
         text('n;x\n' + ''.join(f'{n};{x}\n' for n, x in enumerate(THOUSANDS))), GERMAN, 'seems to separate thousands',
     ),
+    'points of thousands or decimals': (
+        text('x\n' + lines(POINTS)), RATE, r"'x': the point of '\S+' may be decimal or .* format: \{decimal: '\.'\}",
+    ),
+    'points of thousands in ms': (
+        csv([f'{n:,}'.replace(',', '.') for n in range(0, 10 * N, 10)], X), timed('ms'), "column 't': the point of '1",
+    ),
+    'points of thousands behind many rows': (
+        text('x\n' + lines([*range(900), *(['7'] * 25_000), '1.234', '1.234', '1.235'])), RATE, "the point of '1.234'",
+    ),
+    'points that are stated to be decimal': (
+        text('x\n' + lines(POINTS)), {**RATE, 'format': {'decimal': '.'}}, [('cork', np.array(POINTS, float))],
+    ),
+    **{
+        f'points, and {cell}': (
+            csv([*POINTS[:-1], cell], names='x'), RATE, [('cork', np.array([*POINTS[:-1], cell], float))],
+        )
+        for cell in ('0.125', '1234.125', '1.25')
+    },
 }  # fmt: skip
 
 
@@ -741,19 +857,19 @@ def struct_array(path: Path) -> None:
 
 def nested_structs(path: Path) -> None:
     inner = {'acc': ACC, 'material': 'cork'}
-    scipy.io.savemat(path / 'a_1.mat', {'data': {'run1': inner, 'run2': {**inner, 'material': 'felt'}}})
+    scipy.io.savemat(path / 'a_1.mat', {'data': {'run1': inner, 'run2': {'acc': 3 * ACC, 'material': 'felt'}}})
 
 
 def cell_of_structs(path: Path) -> None:
     cells = np.empty(2, object)
-    cells[:] = [{'acc': ACC, 'material': 'cork'}, {'acc': ACC, 'material': 'felt'}]
+    cells[:] = [{'acc': ACC, 'material': 'cork'}, {'acc': 3 * ACC, 'material': 'felt'}]
     scipy.io.savemat(path / 'a_1.mat', {'data': cells})
 
 
 def hdf5_groups(path: Path) -> None:
     with h5py.File(path / 'a_1.h5', 'w') as file:
         for number, material in enumerate(('cork', 'felt'), 1):
-            file[f'data/{number}/acc'], file[f'data/{number}/material'] = ACC, material
+            file[f'data/{number}/acc'], file[f'data/{number}/material'] = number * ACC, material
 
 
 def matlab73_struct_array(path: Path) -> None:
@@ -762,7 +878,7 @@ def matlab73_struct_array(path: Path) -> None:
         for name in ('acc', 'material'):
             file.create_dataset(f'data/{name}', (1, 2), dtype=reference)
         for number, material in enumerate(('cork', 'felt')):
-            file[f'#refs#/a{number}'] = ACC.T
+            file[f'#refs#/a{number}'] = (1 + number) * ACC.T
             text = file.create_dataset(f'#refs#/m{number}', data=np.frombuffer(material.encode(), 'u1').astype('u2'))
             text.attrs['MATLAB_class'] = np.bytes_('char')
             file['data/acc'][0, number] = file[f'#refs#/a{number}'].ref

@@ -113,8 +113,8 @@ def test_a_damaged_file_is_read_or_refused(tmp_path: Path, suffix: str) -> None:
 def test_a_column_that_is_missing_is_refused_with_the_nearest(tmp_path: Path, suffix: str) -> None:
     names = list(tables(made(tmp_path, suffix), EVERYTHING)[0].columns)
     with pytest.raises(UnknownName, match="no column 'wrong'"):
-        chosen(['wrong'], names)
-    assert chosen(['*'], names) == names
+        chosen(['wrong'], names, {})
+    assert chosen(['*'], names, {}) == names
 
 
 def test_texts_that_all_refer_to_one_long_text_take_bounded_memory(tmp_path):

@@ -16,6 +16,7 @@ from texture_recordings.mapping import TableMapping, load_mapping, mapping_from
 from texture_recordings.readers import MAPPED
 from texture_recordings.tables import ImportReport, import_tables
 
+TIMED = {'streams': {'signal': {'columns': ['x'], 'time': {'column': 't'}}}, 'label': {'value': 'cork'}}
 FIRST_STROKE = 40  # row of the first stroke, after rest
 
 
@@ -134,7 +135,7 @@ def test_losses_and_rows_whose_times_contradict_each_other_are_counted(tmp_path:
         ("['acc_*']", '[acc_x, acc_w]', r"v20.csv': no column 'acc_w'; did you mean 'acc_[xyz]'\?"),
         ('{column: t, unit: ms}', '{column: time, unit: ms}', "no column 'time'"),
         ('{column: t, unit: ms}', '{column: t, unit: s}\n    rate_hz: 100', '0.1 Hz by its times, 100 Hz are'),
-        ("['acc_*']\n    channels: [x, y, z]", '[phase]', "910, first row 3, column 'phase': 'rest' is no"),
+        ("['acc_*']\n    channels: [x, y, z]", '[phase]', "'phase' is a channel .* under `slides`"),
         ('[stroke 1, stroke 2, stroke 3]', '[stroke]', "column 'phase' has none of the values stroke; it has rest"),
         ('{column: material}', '{column: materiel}', "no column 'materiel'; did you mean 'material'"),
         ('.csv', '.dat', "has the form '{day}, {material}, v{speed}.dat'"),
@@ -164,7 +165,24 @@ def test_a_mapping_that_does_not_fit_is_refused_with_the_place(
         ({'slides': {'by': 'label'}}, 'mapping, slides: .* allowed is one of file, column, pause, row'),
         ({'conditions': {'speed': {'unit': 'mph'}}}, "the unit of speed is 'mph'; use one of m/s, cm/s, mm/s"),
         ({'files': '{a}_{a}.csv'}, 'has a field twice'),
+        (
+            {**TIMED, 'conditions': {'force': {'column': 't'}}},
+            "column 't' is under `time` and under `conditions`; name",
+        ),
+        *(
+            ({'streams': {'signal': {'columns': ['x'], 'time': time}}}, f'names {unit}, .*; write unit: {unit}, or')
+            for unit, time in (
+                ('ms', {'column': 't_ms'}),
+                ('us', {'column': 'Time [µs]', 'unit': 'ms'}),
+                ('s', {'column': 'time_s', 'unit': 'ms'}),
+                ('ns', {'column': '/imu/stamp.nsec', 'unit': 'us'}),
+                ('ms', {'column': 'clock (ms)', 'unit': 'min'}),
+                ('s', {'column': 'T_S', 'unit': 'us'}),
+            )
+        ),
+        ({**TIMED, 'label': {'column': 't'}}, "column 't' is under `time` and under `label`"),
         ([], 'a mapping of parameter names to values is needed'),
+        ({'streams': {'signal': {'columns': ['a'], 'scale': 0}}}, "'scale' is 0, by which all samples are 0; write"),
         ({'streams': {'signal': {'columns': ['a'], 'scale': math.inf}}}, "'scale' is inf; allowed is a finite number"),
         ({'streams': {'signal': {'columns': ['a'], 'rate_hz': 10**5000}}}, "'rate_hz' is inf; allowed is 0.0 to"),
     ],
@@ -185,6 +203,13 @@ def test_a_column_in_braces_and_whole_numbers_are_names() -> None:
     mapping = mapping_from({'streams': {'signal': {'columns': [0, 1, '3-5']}}, 'label': {'value': 7}})
     assert mapping.streams['signal'].columns == ['0', '1', '3-5']
     assert mapping.label.value == '7'
+
+
+@pytest.mark.parametrize('column', ['t', 'times', 'items', '_', 'ms', 't_ms2', 'tMs', 'time (s) UTC'])
+def test_a_column_of_time_whose_name_has_no_unit_has_that_of_the_mapping(column: str) -> None:
+    time = {'column': column, 'unit': 'us'}
+    mapping = mapping_from({'streams': {'signal': {'columns': ['x'], 'time': time}}, 'label': {'value': 'cork'}})
+    assert mapping.streams['signal'].time.unit == 'us'
 
 
 def test_an_import_that_fails_leaves_no_half_of_it(tmp_path: Path, mapping: TableMapping) -> None:
@@ -225,12 +250,12 @@ def test_trials_of_arrays_for_machine_learning_are_slides(tmp_path: Path) -> Non
 def test_arrays_whose_axes_were_mixed_up_are_put_in_order_by_a_shipped_mapping(tmp_path: Path) -> None:
     taxels = np.random.default_rng(0).normal(size=(75, 60))
     mixed = taxels.reshape(6, 75, 10).transpose(1, 0, 2).reshape(75, 60)  # six patches of ten taxels
-    slides = {f'{name}/val_{k % 2}_0{k}': mixed for name in ('oak', 'cork') for k in range(3)}
+    slides = {f'{name}/val_{k % 2}_0{k}': (k + len(name)) * mixed for name in ('oak', 'cork_oak') for k in range(3)}
     import_tables(load_mapping('icub20'), save(tmp_path, **slides) / 'in', tmp_path / 'out')
     dataset = SlideDataset.from_bags([tmp_path / 'out'])
     assert dataset.condition('number').tolist() == [1, 2, 3] * 2
     for read in dataset.to_numpy('signal_static')[0]:
-        np.testing.assert_allclose(read, taxels, atol=1e-6)
+        np.testing.assert_allclose(read * (taxels[0, 0] / read[0, 0]), taxels, atol=1e-6)
 
 
 def test_an_order_of_axes_that_does_not_fit_is_refused(tmp_path: Path) -> None:

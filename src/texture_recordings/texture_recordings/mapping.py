@@ -47,6 +47,12 @@ def template_fields(template: str, name: str) -> dict[str, str] | None:
 
 
 TIME_UNITS: Mapping[str, float] = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'min': 60.0}
+# How names of columns end that name their unit: t_ms, 't (s)', 'time [us]'; in the order of TIME_UNITS.
+UNIT_IN_NAME = re.compile(
+    r'.*(?:[_. ]|[(\[] ?)(?:(s|sec|seconds?)|(ms|msec|milliseconds?)|([uµμ]s|usec|microseconds?)|(ns|nsec|nanoseconds?)'
+    r'|(min|minutes?)) ?[)\]]?',
+    re.IGNORECASE,
+)
 BORDERS = ('file', 'column', 'pause', 'row')
 
 
@@ -55,7 +61,11 @@ class FileFormat:
     """How a file is read, where its kind does not say it."""
 
     delimiter: str = param('', "Character between columns of a text file; '' finds one of , ; tab | or space.")
-    decimal: str = param('.', 'Decimal sign of numbers in a text file.', choices=('.', ','))
+    decimal: str = param(
+        '',
+        "Decimal sign of numbers in a text file; '' is '.', and refuses a column in which it may separate thousands.",
+        choices=('', '.', ','),
+    )
     skip_rows: int = param(0, 'Number of lines of a text file that are skipped at its top.', low=0, high=10_000)
     header: bool = param(True, 'Says whether a row with names of columns comes first; without, they count from 0.')
     transpose: bool = param(False, 'Says whether arrays are (n_channels, n_samples) and not (n_samples, n_channels).')
@@ -81,13 +91,24 @@ class TimeColumn:
     column: str = param('', "Names the column of time; '' takes rows as evenly spaced at `rate_hz`.")
     unit: str = param('s', 'Names the unit of the column of time.', choices=tuple(TIME_UNITS))
 
+    def __post_init__(self) -> None:
+        if named := UNIT_IN_NAME.fullmatch(self.column):
+            unit = next(unit for unit, text in zip(TIME_UNITS, named.groups(), strict=True) if text)
+            if unit != self.unit:
+                raise InvalidParameter(
+                    f"column '{self.column}' under `time` names {unit}, its unit is {self.unit}; write unit: {unit}, "
+                    'or rename the column if its name is wrong'
+                )
+
 
 @dataclass(frozen=True)
 class StreamColumns:
     """The columns of one stream: `signal` for vibration, `signal_static` for slow channels."""
 
     columns: list[str] = param(  # noqa: RUF009 – it gives a field
-        [], "Names the columns in their order: names, patterns ('taxel*') or ranges ('0-8', 'acc.1-3')."
+        [],
+        "Names the columns in their order: names, patterns ('taxel*') or ranges ('0-8', 'acc.1-3'); patterns leave out "
+        'columns that another key names.',
     )
     channels: list[str] = param(  # noqa: RUF009 – it gives a field
         [], 'Names the channels in the bag; [] takes the names of the columns.'
@@ -105,6 +126,12 @@ class StreamColumns:
         high=1_000_000,
     )
     time: TimeColumn = field(default_factory=TimeColumn)
+
+    def __post_init__(self) -> None:
+        if not self.scale:
+            raise InvalidParameter(
+                "parameter 'scale' is 0, by which all samples are 0; write another factor, such as 1"
+            )
 
 
 @dataclass(frozen=True)
@@ -202,10 +229,26 @@ class TableMapping:
         for name, stream in self.streams.items():
             if not stream.columns:
                 raise InvalidParameter(f"the stream '{name}' has no columns; list their names")
+            if (role := self.roles().get(stream.time.column, 'time')) != 'time':
+                raise InvalidParameter(
+                    f"column '{stream.time.column}' is under `time` and under `{role}`; name another under one of them"
+                )
         if bool(self.label.column) == bool(self.label.value):
             raise InvalidParameter('the label has not one origin; give `column` or `value` under `label`')
         if self.slides.by == 'column' and not self.slides.column:
             raise InvalidParameter('slides end where a column changes, and none is named; give `column` under `slides`')
+
+    def roles(self) -> dict[str, str]:
+        """Return the columns that are no samples by name, with the key that names them."""
+        roles = {
+            **{one.time.column: 'time' for one in self.streams.values()},
+            **{one.column: 'conditions' for one in self.conditions.values()},
+            **dict.fromkeys(self.rows, 'rows'),
+            self.slides.column * (self.slides.by == 'column'): 'slides',
+            self.session: 'session',
+            self.label.column: 'label',
+        }
+        return {name: key for name, key in roles.items() if name}
 
     def texts(self) -> list[str]:
         """Return the names of the columns that are read as texts."""

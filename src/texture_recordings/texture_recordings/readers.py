@@ -83,8 +83,12 @@ class TableFrame:
         return array if array.dtype.kind == 'O' else array.astype(str).astype(object)
 
 
-def chosen(wanted: Sequence[str], names: Sequence[str]) -> list[str]:
-    """Return the columns that names, patterns such as 'taxel*' and ranges such as '0-8' mean, in their order."""
+def chosen(wanted: Sequence[str], names: Sequence[str], other: Mapping[str, str]) -> list[str]:
+    """Return the columns that names, patterns such as 'taxel*' and ranges such as '0-8' mean, in their order.
+
+    Patterns leave out columns that have another key of the mapping; named ones are refused, but those of conditions: a
+    force may be a channel, too.
+    """
     found = []
     for name in wanted:
         match = RANGE.fullmatch(name)
@@ -92,9 +96,14 @@ def chosen(wanted: Sequence[str], names: Sequence[str]) -> list[str]:
         if name not in names and match and 0 <= int(match[3]) - int(match[2]) < MAX_RANGE:
             meant = [f'{match[1]}{number}' for number in range(int(match[2]), int(match[3]) + 1)]
         elif name not in names and len(name) <= 100:
-            meant = [one for one in names if one and fnmatch.fnmatchcase(one, name)] or [name]
+            meant = [one for one in names if one and one not in other and fnmatch.fnmatchcase(one, name)] or [name]
         if unknown := [one for one in meant if one not in names]:
             raise unknown_name(unknown[0], names, 'column')
+        if twice := [one for one in meant if other.get(one, 'conditions') != 'conditions']:
+            raise InvalidData(
+                f"column '{twice[0]}' is a channel under `columns` and is the column under `{other[twice[0]]}`; remove "
+                'it from one of them'
+            )
         found += meant
     return found
 
@@ -150,7 +159,8 @@ NO_TEXT = frozenset(('nan', 'na', 'n/a', '#n/a', 'null'))  # 'none' may be a lab
 BLANK = frozenset(('', 'nan', 'na', 'null', 'none'))
 NO_WORD = NO_TEXT | BLANK | {'inf', '-inf', '+inf'}
 WORD = re.compile(r'[^\W\d_]')
-THOUSANDS = re.compile(r'[+-]?[1-9]\d{0,2}(,\d{3})+')
+THOUSANDS = {sign: re.compile(rf'[+-]?[1-9]\d{{0,2}}({re.escape(sign)}\d{{3}})+') for sign in '.,'}
+FEW_THOUSANDS = 3  # cells with a point: fewer may be decimals by chance
 NUMERIC = 0.9  # share of numbers in a column of numbers
 
 
@@ -166,13 +176,10 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
     gapped, gap_reasons = list[AnyArray](), list[str]()
     with open_regular(path) as opened:
         # The names of the columns, and those that the mapping wants as numbers.
-        rest = _lines(opened, form)
-        first = next(rest, (0, ''))
-        rest = rest if form.header else chain([first], rest)
-        delimiter = form.delimiter or next((one for one in DELIMITERS if one in first[1]), ',')
-        names = _names(_cells(first[1], delimiter), form)
+        rest, delimiter, names = _opened(opened, form)
         numbers, conditions = _wanted(mapping, names)
         numeric: dict[str, bool] = {}
+        thousands = Thousands(numbers, form.decimal)
         # Block by block: the cells, what they are, and the rows that are malformed.
         for block in iter(lambda: list(islice(rest, BLOCK_ROWS)), []):
             take(len(block) * (len(names) + len(mapping.texts())))
@@ -199,7 +206,8 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
                         bad.setdefault(row, _reason(name, cells[row], form))
                     elif row not in bad and WORD.search(cells[row]) and cells[row].lower() not in NO_WORD:
                         words[row] = name
-                _refuse_commas(name, () if text else cells, form, delimiter)
+                _refuse_codes(name, () if text else cells, delimiter)
+                thousands.add(name, cells)
                 part[name] = _texts(cells) if text else values
             numbered = [number for number, _ in block]
             _refuse_other_rows(
@@ -216,6 +224,7 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
             parts.append(part)
     if not parts:
         raise InvalidData('it has no rows below the names of its columns; choose files with samples')
+    thousands.refuse()
     columns = {name: np.concatenate([part[name] for part in parts]) for name in names}
     marked = np.concatenate(junk)
     # A malformed row ends no slide: it has the texts of the one before.
@@ -229,7 +238,7 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
 
 def _wanted(mapping: TableMapping, names: Sequence[str]) -> tuple[set[str], set[str]]:
     """Return the columns that the mapping wants as numbers, and those of them that are of a condition alone."""
-    samples = {name for one in mapping.streams.values() for name in chosen(one.columns, names)}
+    samples = {name for one in mapping.streams.values() for name in chosen(one.columns, names, mapping.roles())}
     needed = {*samples, *mapping.texts(), *(one.time.column for one in mapping.streams.values())}
     return {*samples, *mapping.numbers()}, {*mapping.numbers()} - needed
 
@@ -252,7 +261,16 @@ def _refuse_other_rows(names: Sequence[str], malformed: Mapping[int, Sequence[st
         )
 
 
-def _names(cells: Sequence[str], form: FileFormat) -> list[str]:
+def _opened(opened: Any, form: FileFormat) -> tuple[Iterator[tuple[int, str]], str, list[str]]:
+    """Return the lines of rows, the delimiter, and the names of the columns by the first row."""
+    rest = _lines(opened, form)
+    first = next(rest, (0, ''))
+    delimiter = form.delimiter or next((one for one in DELIMITERS if one in first[1]), ',')
+    names = _names(_cells(first[1], delimiter), form, first[0])
+    return rest if form.header else chain([first], rest), delimiter, names
+
+
+def _names(cells: Sequence[str], form: FileFormat, line: int) -> list[str]:
     """Return the names of the columns by the first row."""
     if cells == ['']:
         raise InvalidData('it is empty, or has comments only; choose files with samples')
@@ -265,24 +283,23 @@ def _names(cells: Sequence[str], form: FileFormat) -> list[str]:
     twice = [name for name in cells if cells.count(name) > 1]
     if twice:
         raise InvalidData(f"it has the column '{twice[0]}' twice; give each column a different name")
-    values = np.array([number_of(name) for name in cells])
-    counted = all(name.isdigit() for name in cells) and (np.diff(values) == 1).all()
-    if np.isfinite(values).all() and not counted:
+    if np.isfinite([number_of(name) for name in cells]).all():
         raise InvalidData(
             f'the first row is {", ".join(cells[:3])[:60]}, which are numbers and no names; write '
-            'format: {header: false}, or skip fewer rows'
+            f'format: {{header: false}} if they are samples, and format: {{header: false, skip_rows: {line}}} if they '
+            'are names: columns then count from 0'
         )
     return list(cells)
 
 
 def _reason(name: str, cell: str, form: FileFormat) -> str:
-    decimal = form.decimal == '.' and math.isfinite(number_of(cell.replace(',', '.')))
+    decimal = form.decimal != ',' and math.isfinite(number_of(cell.replace(',', '.')))
     hint = "; if commas are decimal, write format: {decimal: ','}" if decimal else ''
     return f"column '{name}': '{cell[:40]}' is not a finite number{hint}"
 
 
-def _refuse_commas(name: str, cells: Sequence[str], form: FileFormat, delimiter: str) -> None:
-    """Refuse commas that may be decimal as well as delimiters, or that separate thousands where they are decimal."""
+def _refuse_codes(name: str, cells: Sequence[str], delimiter: str) -> None:
+    """Refuse digits that may stand behind a decimal comma, where commas are delimiters, too."""
     digits = (
         [cell for cell in cells if cell]
         if delimiter == ',' and all(cell.isdigit() or not cell for cell in cells)
@@ -293,11 +310,42 @@ def _refuse_commas(name: str, cells: Sequence[str], form: FileFormat, delimiter:
             f"the column '{name}' holds digits such as {digits[0]}, so commas may be decimal as well as between "
             'columns; save it with another delimiter'
         )
-    commas = [cell for cell in cells if ',' in cell] if form.decimal == ',' else []
-    if 0 < len(commas) < len(cells) and all(THOUSANDS.fullmatch(cell) for cell in commas):
-        raise InvalidData(
-            f"column '{name}': the comma of '{commas[0]}' seems to separate thousands; save numbers without such commas"
-        )
+
+
+class Thousands:
+    """Columns whose signs may separate thousands: some cells have none, and three digits follow it in all others."""
+
+    def __init__(self, names: Iterable[str], decimal: str) -> None:
+        self._decimal, self._sign = decimal, decimal or '.'
+        self._signed: dict[str, list[str]] = {name: [] for name in names}  # without columns of certain decimals
+        self._whole: set[str] = set()
+
+    def add(self, name: str, cells: Sequence[str]) -> None:
+        """Look at further cells of a column."""
+        if name not in self._signed:
+            return
+        signed = [cell for cell in cells if self._sign in cell]
+        if all(THOUSANDS[self._sign].fullmatch(cell) for cell in signed):
+            self._signed[name] += signed[:FEW_THOUSANDS]
+            self._whole |= {name} if any(cell.lstrip('+-').isdigit() for cell in cells) else set()
+        else:
+            del self._signed[name]
+
+    def refuse(self) -> None:
+        """Refuse a column in which it is a comma, or a point that the mapping does not call decimal."""
+        for name in self._signed.keys() & self._whole:
+            cells = self._signed[name]
+            if self._decimal == ',' and cells:
+                raise InvalidData(
+                    f"column '{name}': the comma of '{cells[0]}' seems to separate thousands; save numbers without "
+                    'such commas'
+                )
+            if not self._decimal and len(cells) >= FEW_THOUSANDS:
+                raise InvalidData(
+                    f"column '{name}': the point of '{cells[0]}' may be decimal or separate thousands, as three digits "
+                    "follow each one and other cells have none; write format: {decimal: '.'} if it is decimal, or "
+                    'save numbers without such points'
+                )
 
 
 def _lines(opened: Any, form: FileFormat) -> Iterator[tuple[int, str]]:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import fnmatch
+import hashlib
 import math
 import re
 import unicodedata
@@ -12,6 +13,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -62,6 +64,8 @@ SAME_TIME_S = 1e-9
 MAX_NUMBERED = 3  # columns name_1 … name_n beyond this may be samples: the mapping has to tell
 ROWS_A_CODE = 2  # at least, of a column that may name sensors, trials or runs
 MANY_TEXTS = 50  # different ones are no codes
+SHARED, MOST_HOPS = 4, 1000  # samples that windows share at least, and shifts at which they are compared
+OVERLAPPING = 0.25  # share of slides that overlap with the one before by equally many samples
 FLAGS = {'true', 'false', 'yes', 'no', 'on', 'off'}
 CODE_NAME = re.compile(
     r'(?:sensor|finger|trial|run|rep|repeat|repetition|recording|session|pass|stroke)s?[ _-]?(?:id|no|nr|number)?'
@@ -88,12 +92,25 @@ class ImportReport:
     conditions: dict[tuple[str, str], list[float]] = field(default_factory=lambda: defaultdict(list))
     left_out: Counter[str] = field(default_factory=Counter)  # by reason
     examples: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
+    names: dict[bytes, str] = field(default_factory=dict)  # of slides, by the digest of their samples
 
     def leave_out(self, reason: str, count: int, *examples: str) -> None:
         """Count what is left out, with the first places."""
         if count:
             self.left_out[reason] += count
             self.examples[reason] += examples[: EXAMPLES - len(self.examples[reason])]
+
+    def refuse_copy(self, name: str, streams: SlideStreams) -> None:
+        """Refuse a slide that has the samples of one before: in training and test it would be no independent one."""
+        digest = hashlib.sha256()
+        for topic, (signal, _) in streams.items():
+            digest.update(f'{topic} {signal.samples.shape}'.encode() + signal.samples.tobytes())
+        other = self.names.setdefault(digest.digest(), name)
+        if other != name:
+            raise InvalidData(
+                f"the slides '{name}' and '{other}' (file/number of the slide) have the same samples; a copy is no "
+                'further slide, remove one of them, or its row or file'
+            )
 
     def refuse_like_labels(self, names: Mapping[str, str]) -> None:
         """Refuse labels that differ in nothing that a person would tell apart, and that `names` does not name."""
@@ -157,17 +174,19 @@ def import_tables(
         for path, place, fields in progress(_files(mapping, Path(source), kinds, report), 'import files'):
             for frame in frames(path, place, mapping):
                 with placed(frame.place):
-                    for slide in FrameSlides(mapping, _with_fields(frame, fields), report).slides():
-                        bags.write(*slide)
+                    for session, states, streams in FrameSlides(mapping, _with_fields(frame, fields), report).slides():
+                        report.refuse_copy(states[0].exploration_id, streams)
+                        bags.write(session, states, streams)
             if kind_of(path) == 'bag' and is_cut_off(path):
                 report.leave_out(
                     'bags were cut off, and end with their last whole part', 1, f"'{place}'; see mcap recover"
                 )
         report.refuse_like_labels(mapping.label.names)
         if not report.slides:
+            left = [f'{count} {reason}' for reason, count in report.left_out.items() if reason.startswith('slides')]
             raise InvalidData(
-                f"no slide of {mapping.slides.min_s:g} s or more in '{source}': "
-                f'{report.left_out["slides are too short"]} are shorter; look at `slides` in the mapping'
+                f"no slide of {mapping.slides.min_s:g} s or more with samples that change in '{source}': "
+                f'{", ".join(left)}; look at `slides` and at `columns` in the mapping'
             )
     report.bags = bags.paths
     return report
@@ -236,6 +255,11 @@ class Stream:
     rate_hz: float = 0.0  # of rows
     burst_s: float = 0.0
 
+    @property
+    def at_s(self) -> Array:
+        """Times of the rows, by their number where there are no others."""
+        return self.rows / self.rate_hz if self.time_s is None else self.time_s
+
 
 class FrameSlides:
     """The slides of one frame."""
@@ -244,7 +268,8 @@ class FrameSlides:
         self._mapping, self._report, self._place = mapping, report, frame.place
         self._frame = self._wanted_rows(frame)
         names = [name for name, array in self._frame.columns.items() if array.ndim]
-        self._used = {name: chosen(one.columns, names) for name, one in mapping.streams.items()}
+        other = {**dict.fromkeys(frame.clocks.values(), 'time'), **mapping.roles()}
+        self._used = {name: chosen(one.columns, names, other) for name, one in mapping.streams.items()}
         self._texts = {name: self._frame.texts(name) for name in mapping.texts()}
         numbers = [*(column for columns in self._used.values() for column in columns), *mapping.numbers()]
         self._numbers = {name: self._frame.numbers(name) for name in numbers}
@@ -268,16 +293,34 @@ class FrameSlides:
     def slides(self) -> Iterator[tuple[str, list[ExplorationState], SlideStreams]]:
         """Yield what `SlideBags.write` takes."""
         params, reference, short, inside = self._mapping.slides, self._reference, 0, 0
-        times = reference.rows / reference.rate_hz if reference.time_s is None else reference.time_s
+        times = reference.at_s
+        before: AnyArray = np.empty(0)
+        hops = Counter[int]()
         for number, span in enumerate(self._spans, 1):
             rows = span.stop - span.start
             inside += rows
+            where = f"'{self._place}', row {self._line(reference.rows[span.start])}"
             if rows * reference.per_row < 2 or rows / reference.rate_hz < params.min_s - 1e-9:
                 short += rows
-                where = f"'{self._place}', row {self._line(span.start)}: {rows * reference.per_row} samples"
-                self._report.leave_out('slides are too short', 1, where)
+                self._report.leave_out('slides are too short', 1, f'{where}: {rows * reference.per_row} samples')
                 continue
-            yield self._slide(times, span, number)
+            span_s = float(times[span].min()), float(times[span].max()) + 1.0 / reference.rate_hz
+            still = [one.name for one in self._streams if not _changes(one, self._within(one, span, span_s))]
+            if still:
+                self._report.leave_out(f"slides in which no channel of '{still[0]}' changes", 1, where)
+                continue
+            slide = self._slide(span, span_s, number)
+            samples = next(iter(slide[2].values()))[0].samples
+            hops[_hop(before, samples)] += 1
+            before = samples
+            yield slide
+        hop, count = max(((hop, count) for hop, count in hops.items() if hop), default=(0, 0), key=itemgetter(1))
+        if count and count >= OVERLAPPING * (hops.total() - 1):
+            raise InvalidData(
+                f'{count} of {hops.total()} slides begin {hop} samples behind the one before, with samples that stand '
+                'in it: they are windows of one recording and no independent slides; give whole recordings as slides, '
+                'which are cut into windows later'
+            )
         if short > MAX_LEFT_OUT * inside and short < inside and params.min_s == type(params).min_s:
             raise InvalidData(
                 f'{short} of {inside} rows lie in slides that are shorter than {params.min_s:g} s; look at `slides` in '
@@ -544,20 +587,20 @@ class FrameSlides:
             )  # fmt: skip
         return first
 
-    def _slide(self, times: Array, rows: slice, number: int) -> tuple[str, list[ExplorationState], SlideStreams]:
-        label, reference = self._mapping.label, self._reference
-        surface = checked_label(self._named(label.value or self._value(label.column, rows, 'label')))
+    def _slide(
+        self, rows: slice, span_s: tuple[float, float], number: int
+    ) -> tuple[str, list[ExplorationState], SlideStreams]:
+        label, (begin_s, end_s) = self._mapping.label, span_s
+        surface = checked_label(label.value or self._named(self._value(label.column, rows, 'label')))
         if not surface:
             raise InvalidData('a slide has an empty label; name another column under `label`')
         session = self._value(self._mapping.session, rows, 'session') if self._mapping.session else surface
-        begin_s, end_s = float(times[rows].min()), float(times[rows].max()) + 1.0 / reference.rate_hz
         if end_s - begin_s > LONGEST_SLIDE_S:
             raise InvalidData(
-                f'row {self._line(reference.rows[rows.start])}: a slide lasts {end_s - begin_s:.4g} s, at most '
+                f'row {self._line(self._reference.rows[rows.start])}: a slide lasts {end_s - begin_s:.4g} s, at most '
                 f'{LONGEST_SLIDE_S:g} s are plausible; look at the column of time, its unit and `slides`'
             )
-        streams = {one.name: self._samples(one, surface, self._frame_rows(rows), begin_s, end_s)
-                   for one in self._streams}  # fmt: skip
+        streams = {one.name: self._samples(one, surface, rows, span_s) for one in self._streams}
         self._report.with_nan += any(np.isnan(signal.samples).any() for signal, _ in streams.values())
         known: dict[str, Any] = {}
         for name, column in CONDITION_COLUMNS.items():
@@ -575,35 +618,42 @@ class FrameSlides:
         names = self._mapping.label.names
         number = number_of(code)
         same = [code] if code in names else [one for one in names if number_of(one) == number]
-        if not same and names and math.isfinite(number) and all(math.isfinite(number_of(one)) for one in names):
+        if not same and math.isfinite(number):
             raise InvalidData(
-                f'the label {code} has no name; it is none of {", ".join(names)} under `names`; add it, or leave its '
-                'rows out by `values` under `slides`'
+                f'the label {code} has no name; it is none of {", ".join(names) or "the codes"} under `names`; write '
+                f'names: {{{code}: NAME}} under `label`, name another column, or leave its rows out by `values` under '
+                '`slides`'
             )
         return names[same[0]] if same else code
 
+    def _within(self, stream: Stream, span: slice, span_s: tuple[float, float]) -> slice:
+        """Return the rows of a stream in a slide of the reference."""
+        if stream.group == self._reference.group:
+            first, last = np.searchsorted(stream.rows, self._frame_rows(span))
+        else:
+            first, last = np.searchsorted(stream.at_s, np.subtract(span_s, SAME_TIME_S))
+        if first == last:
+            raise InvalidData(
+                f"no samples of '{stream.name}' from {span_s[0]:g} to {span_s[1]:g} s of a slide; look at the times of "
+                'the streams'
+            )
+        return slice(int(first), int(last))
+
     def _samples(
-        self, stream: Stream, surface: str, frame_rows: tuple[int, int], begin_s: float, end_s: float
+        self, stream: Stream, surface: str, span: slice, span_s: tuple[float, float]
     ) -> tuple[TactileSignal, AnyArray]:
         """Return the samples of a slide, and their places on the grid."""
-        at = stream.rows / stream.rate_hz if stream.time_s is None else stream.time_s
-        if stream.group == self._reference.group:
-            first, last = np.searchsorted(stream.rows, frame_rows)
-        else:
-            first, last = np.searchsorted(at, (begin_s - SAME_TIME_S, end_s - SAME_TIME_S))
-        samples = stream.samples[first:last]
-        if not len(samples):
-            span = f'{begin_s:g} to {end_s:g} s'
-            raise InvalidData(f"no samples of '{stream.name}' from {span} of a slide; look at the times of the streams")
+        within = self._within(stream, span, span_s)
+        samples = stream.samples[within]
         rows: AnyArray = np.arange(len(samples))
         index, counts = rows, Counter(samples=len(samples))
         if stream.time_s is not None and len(samples) > 1:
             try:
                 rows, index, counts = on_grid(
-                    samples, at[first:last], stream.rate_hz, stream.burst_s, stated=stream.params.rate_hz > 0
+                    samples, stream.at_s[within], stream.rate_hz, stream.burst_s, stated=stream.params.rate_hz > 0
                 )
             except ClockFault as fault:
-                raise self._fault(stream.clock, stream.rows[first + fault.row], fault) from fault
+                raise self._fault(stream.clock, stream.rows[within.start + fault.row], fault) from fault
         for reason, left in counts.items():
             if reason in ('samples', 'lost'):
                 self._report.streams[surface, stream.name][reason] += stream.per_row * left
@@ -650,6 +700,25 @@ class FrameSlides:
         values = np.abs(values) if name == 'speed' else values
         mean = float(values.mean()) if len(values) else math.nan
         return abs(mean) if name == 'force' else mean
+
+
+def _changes(stream: Stream, within: slice) -> bool:
+    """Return whether a channel changes within some rows, or one sample is all there is."""
+    samples = stream.samples[within]
+    known = samples[np.isfinite(samples).all(axis=1)]
+    channels = known.reshape(len(known), -1, stream.per_row)
+    return known.size < 2 * len(stream.channels) or bool((channels != channels[:1, :, :1]).any())
+
+
+def _hop(before: AnyArray, after: AnyArray) -> int:
+    """Return how many samples behind the begin of a window the next one begins, 0 if they do not overlap."""
+    if before.shape == after.shape:
+        begins = (before == after[0]).all(axis=1) & (before[-1] == after[::-1]).all(axis=1)
+        for hop in np.flatnonzero(begins[: 1 - SHARED])[:MOST_HOPS].tolist():
+            shared = before[hop:]
+            if hop and (shared != shared[0]).any() and np.array_equal(shared, after[: len(shared)]):
+                return int(hop)
+    return 0
 
 
 def _is_one_of(text: str, wanted: Sequence[str]) -> bool:
