@@ -18,11 +18,10 @@ from texture_estimation.evidence import EvidenceAccumulator, single_decisions
 from texture_estimation.model import TextureModel
 from texture_evaluation import metrics
 from texture_evaluation.cross_validation import (
-    OTHER_SESSION,
-    SAME_SESSION,
-    SAME_TRACK,
+    NO_PLACE,
     CrossValidation,
     PairedComparison,
+    bags_compared,
     figures,
 )
 from texture_evaluation.metrics import SlideResult
@@ -43,7 +42,7 @@ class EvaluationReport:
     latency_us: Array
     unusable: tuple[str, ...] = ()
     tare_faults: tuple[str, ...] = ()
-    shift: str = ''
+    shift: str = NO_PLACE
     trained_on: tuple[str, ...] = ()
     clusters: Sequence[str] | None = None
     too_little_training: str = ''  # how many slides there are and how many are needed
@@ -114,8 +113,6 @@ def evaluate_dataset(model: TextureModel, dataset: SlideDataset) -> EvaluationRe
     if not results:
         raise no_window(dataset, model.recipe.feature_set)
     sessions, digests = (model.training.get(name, ()) for name in ('sessions', 'slide_digests'))
-    there = [slide.session in sessions for slide in results]
-    crossed = SAME_SESSION if all(there) else OTHER_SESSION if not any(there) else f'{SAME_SESSION} and {OTHER_SESSION}'
     known = [slide for slide in results if slide.surface in model.labels]
     return EvaluationReport(
         labels=model.labels,
@@ -124,7 +121,7 @@ def evaluate_dataset(model: TextureModel, dataset: SlideDataset) -> EvaluationRe
         latency_us=np.concatenate([latency for _, latency in tested.values()]),
         unusable=tuple(slide.name for slide in tested if slide not in results),
         tare_faults=tuple(dataset.tare_faults(model.recipe.feature_set)),
-        shift=crossed if sessions else '',
+        shift=f'{bags_compared([(sessions, [slide.session for slide in results])])}; {NO_PLACE}',
         trained_on=tuple(slide.name for slide in results if slide_digest(slide) in digests),
         too_little_training=model.acceptance.reason,
         clusters=[one.name if one.session in sessions else f'{one.surface} {one.session}' for one in known],
@@ -239,8 +236,7 @@ def table(result: CrossValidation, split: str) -> list[str]:
         for title, key in COLUMNS.items()
         if figures[key] is not None
     )
-    whole = 'slides' if result.shift == SAME_TRACK else 'clusters (surface × what was left out)'
-    lines.append(f'95 % intervals over {figures["n_clusters"]} {whole}: {"; ".join(intervals)}')
+    lines.append(f'95 % intervals over {figures["n_clusters"]} {result.intervals_over}: {"; ".join(intervals)}')
     lines.append(by_reason(figures['rejections']))
     if result.untested:
         names = ', '.join(f"'{surface}' ({count} slides)" for surface, count in result.untested.items())
@@ -274,7 +270,7 @@ def summary(report: EvaluationReport) -> list[str]:
     early, latency = figures['early'], figures['latency_us']
     lines = [
         f'slides: {len(report.known)} over trained surfaces, {len(report.unknown)} over others',
-        *([f'training and test, by the names of the bags: {report.shift}'] if report.shift else []),
+        f'training and test, by the names of the bags: {report.shift}',
         *(
             [
                 f'accuracy of single windows: {percent(figures["window_accuracy"])}',
