@@ -256,7 +256,12 @@ def by_reason(rejections: Mapping[str, int]) -> str:
     return f'slides rejected at the end: {counts or "none"}'
 
 
-ENDS = {'accepted and correct': 'accepted_correct', 'accepted but wrong': 'accepted_wrong', 'rejected': 'rejected'}
+ENDS = {
+    'accuracy': 'slide_accuracy',
+    'accepted and correct': 'accepted_correct',
+    'accepted but wrong': 'accepted_wrong',
+    'rejected': 'rejected',
+}
 
 
 def summary(report: EvaluationReport) -> list[str]:
