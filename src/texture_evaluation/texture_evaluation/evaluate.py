@@ -43,7 +43,7 @@ class EvaluationReport:
     unusable: tuple[str, ...] = ()
     tare_faults: tuple[str, ...] = ()
     shift: str = NO_PLACE
-    trained_on: tuple[str, ...] = ()
+    slides_in_training: tuple[str, ...] = ()  # of the tested ones, by their samples
     clusters: Sequence[str] | None = None
     too_little_training: str = ''  # how many slides there are and how many are needed
 
@@ -64,7 +64,7 @@ class EvaluationReport:
         wrong, rejected = metrics.accepted_wrong(self.known), metrics.rejected(self.known)
         return {
             'shift': self.shift,
-            'trained_on': list(self.trained_on),
+            'slides_in_training': list(self.slides_in_training),
             'too_little_training': self.too_little_training,
             **figures(self.known, self.clusters),
             'early': metrics.early_decision(self.known) if self.known else nothing,
@@ -122,7 +122,7 @@ def evaluate_dataset(model: TextureModel, dataset: SlideDataset) -> EvaluationRe
         unusable=tuple(slide.name for slide in tested if slide not in results),
         tare_faults=tuple(dataset.tare_faults(model.recipe.feature_set)),
         shift=f'{bags_compared([(sessions, [slide.session for slide in results])])}; {NO_PLACE}',
-        trained_on=tuple(slide.name for slide in results if slide_digest(slide) in digests),
+        slides_in_training=tuple(slide.name for slide in results if slide_digest(slide) in digests),
         too_little_training=model.acceptance.reason,
         clusters=[one.name if one.session in sessions else f'{one.surface} {one.session}' for one in known],
     )
@@ -301,10 +301,10 @@ def summary(report: EvaluationReport) -> list[str]:
     if report.unknown:
         accepted, rejected = percent(figures['unknown_accepted']), by_reason(figures['rejections_of_untrained'])
         lines.append(f'of the {len(report.unknown)} slides over other surfaces: accepted {accepted}; {rejected}')
-    if report.trained_on:
+    if report.slides_in_training:
         lines.append(
-            f'{len(report.trained_on)} of {len(report.known)} slides were in the training, so these figures are '
-            'optimistic; leave them out with --slides'
+            f'{len(report.slides_in_training)} of {len(report.known)} slides were in the training, so these figures '
+            'are optimistic; leave them out with --slides'
         )
     return [*lines, *_unusable(report.unusable), *report.tare_faults, *filter(None, [report.too_little_training])]
 
