@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from foreign_tables import MAPPING, recordings, write_csv
+from matplotlib.figure import Figure
 from scipy.stats import beta
 from sklearn.model_selection import GroupShuffleSplit, LeaveOneGroupOut, PredefinedSplit, StratifiedGroupKFold
 
@@ -25,6 +26,7 @@ from texture_evaluation.cross_validation import (
     FoldResult,
     clustered,
     compare,
+    comparison_chart,
     cross_validate,
     dask_backend,
     interval,
@@ -405,6 +407,18 @@ def test_progress_counts_the_folds(monkeypatch: pytest.MonkeyPatch) -> None:
     )
     result = cross_validate(RECIPE, tones(), LeaveOneGroupOut(), groups='speed')
     assert seen == [(f"cross-validate '{RECIPE.name}', folds", len(result.folds))]
+
+
+def test_axes_end_at_100_percent_and_lines_that_coincide_are_both_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn = []
+    monkeypatch.setattr(Figure, 'savefig', lambda figure, *_, **__: drawn.append(figure))
+    one = cross_validate(RECIPE, tones(), StratifiedGroupKFold(2))
+    comparison_chart([one, replace(one, recipe='other')], 'title', 'figure.png')
+    accuracies, times = drawn[0].axes
+    assert accuracies.get_xlim()[1] == times.get_ylim()[1] == 100.0
+    below, above = times.get_lines()
+    np.testing.assert_array_equal(below.get_ydata(), above.get_ydata())
+    assert below.get_linewidth() >= 2 * above.get_linewidth()
 
 
 def test_slides_of_one_place_are_one_case_of_the_test() -> None:
