@@ -12,6 +12,7 @@ from dataclasses import replace
 from functools import partial
 from itertools import groupby
 from pathlib import Path
+from textwrap import fill
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -628,6 +629,8 @@ SPLIT = (
 # --------------------
 # The chart.
 
+TITLE_CHARACTERS = 62  # of a line as wide as the chart
+MATERIALS = 'BioTac (biotac20), 20 materials, same path'
 DRAWN = {'any-place-and-taxels': COLOURS[0], 'default': COLOURS[1], SVC: COLOURS[3], peers.CNN: COLOURS[5]}
 LINES = {'accuracy': '-', 'accepted_correct': '--', 'accepted_wrong': ':'}
 WORDS = {'accuracy': 'accuracy', 'accepted_correct': 'accepted and correct', 'accepted_wrong': 'accepted but wrong'}
@@ -640,16 +643,43 @@ def generalisation_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
         row: {name: cells[name] for name in (*DRAWN, SVC) if name in cells and name != 'default'}
         for row, cells in numbers[SPACING].items()
     }
-    heights = [3.4, *(0.8 + 0.21 * sum(len(cells) + 1.5 for cells in rows.values()) for rows in (few, numbers[OTHER]))]
+    heights = [4.2, *(1.2 + 0.21 * sum(len(cells) + 1.5 for cells in rows.values()) for rows in (few, numbers[OTHER]))]
     with chart(path, (6.0, sum(heights))) as figure:
         parts: Any = figure.subfigures(3, 1, height_ratios=heights)
-        _draw_distance(parts[0].subplots(), numbers[DISTANCE])
-        spacing, other = (part.subplots() for part in parts[1:])
-        _draw_bars(spacing, few, '2. Several of eight cells trained')
-        _draw_bars(other, numbers[OTHER], '3. Another day, finger, run or speed')
+        distance, spacing, other = (part.subplots() for part in parts)
+        _draw_distance(distance, numbers[DISTANCE])
+        _draw_bars(spacing, few)
+        _draw_bars(other, {f'{row}, n = {_tested(cells)}': cells for row, cells in numbers[OTHER].items()})
+        drawn = {
+            row: {name: cells[name] for name in DRAWN if name in cells} for row, cells in numbers[DISTANCE].items()
+        }
+        data = f'{MATERIALS}; {CELL_CM} cm (0.7 s) each, later slides tested'
+        for part, title in zip(
+            parts,
+            (
+                f'1. Other places: one of {CELLS} cells trained. {data}, n = {_n_of(drawn)}',
+                f'2. Other places: several of {CELLS} cells trained. {data}, n = {_n_of(few)}',
+                '3. Another day, finger, run or speed',
+            ),
+            strict=True,
+        ):
+            part.suptitle(fill(title, TITLE_CHARACTERS), x=0.02, ha='left')
         spacing.set_xlabel('')
         parts[2].legend(*other.get_legend_handles_labels(), loc='outside lower center', ncols=2)
     return Path(path)
+
+
+def _n_of(rows: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return the least and the most slides that methods were tested with in a row, and which methods."""
+    names: defaultdict[str, list[str]] = defaultdict(list)
+    for name in dict.fromkeys(name for cells in rows.values() for name in cells):
+        names[_tested({row: cells[name] for row, cells in rows.items() if name in cells})].append(name)
+    return '; '.join(f'{span} ({", ".join(methods)})' for span, methods in names.items())
+
+
+def _tested(cells: Mapping[str, Any]) -> str:
+    found = sorted({cell['slides'] for cell in cells.values()})
+    return f'{found[0]}–{found[-1]}' if len(found) > 1 else f'{found[0]}'
 
 
 def _draw_distance(axes: Any, rows: Mapping[str, Mapping[str, Any]]) -> None:
@@ -666,11 +696,10 @@ def _draw_distance(axes: Any, rows: Mapping[str, Mapping[str, Any]]) -> None:
     for what, dashes in LINES.items():
         axes.plot([], [], dashes, color='black', label=WORDS[what])
     axes.set(ylim=(0, 101), xlabel='distance from the trained track (cm)', ylabel='slides (%)')
-    axes.set_title('1. One place trained, 0.7 s of sliding', loc='left')
     axes.figure.legend(*axes.get_legend_handles_labels(), loc='outside lower center', ncols=2)
 
 
-def _draw_bars(axes: Any, rows: Mapping[str, Mapping[str, Any]], title: str) -> None:
+def _draw_bars(axes: Any, rows: Mapping[str, Mapping[str, Any]]) -> None:
     """Draw accepted and correct in colour, rejected but correct in its shade, accepted but wrong in black."""
     ticks, names, at = [], [], 0.0
     from_the_left = blended_transform_factory(axes.figure.transSubfigure, axes.transData)
@@ -690,7 +719,6 @@ def _draw_bars(axes: Any, rows: Mapping[str, Mapping[str, Any]], title: str) -> 
         at += 0.5
     axes.set_yticks(ticks, names)
     axes.set(xlim=(0, 101), ylim=(at - 0.8, -0.7), xlabel='slides (%)')
-    axes.set_title(title, loc='left')
     for label, look in (
         ('accepted and correct', {'color': 'grey'}),
         ('correct, rejected', {'color': 'grey', 'alpha': 0.35}),

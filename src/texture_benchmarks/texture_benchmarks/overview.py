@@ -220,6 +220,12 @@ TICKS = {LEAST: '100', **{wrong: f'{100.0 - wrong:g}' for wrong in (0.5, 1.0, 2.
 TICKS_S = (0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0)
 
 
+def _measured(numbers: Mapping[str, Any]) -> str:
+    """Return data set, split, shift and n of both charts."""
+    n = max(cell['slides'] for cells in numbers.values() for cell in cells.values())
+    return f'BioTac (biotac20), 20 materials, same track: slides 1–30 of each trained, 31–40 tested (n = {n})'
+
+
 def wrong_percent(value: AnyArray | Sequence[float] | float) -> Array:
     """Return the percentage wrong, LEAST for none."""
     return np.maximum(100.0 * (1.0 - np.asarray(value, dtype=np.float64)), LEAST)
@@ -227,9 +233,7 @@ def wrong_percent(value: AnyArray | Sequence[float] | float) -> Array:
 
 def sliding_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
     """Draw the accuracy of slides over the sliding time, with the interval of ours, in a panel for the channels."""
-    counts = {cell['slides'] for cells in numbers.values() for cell in cells.values()}
-    title = f'Accuracy on the same track, {max(counts)} later slides'
-    with chart(path, (6.2, 7.4), title) as figure:
+    with chart(path, (6.2, 7.6), f'Accuracy over the sliding time. {_measured(numbers)}') as figure:
         for axes, channels in zip(figure.subplots(2, 1, sharex=True), (VIBRATION, ALL_CHANNELS), strict=True):
             _draw_sliding(axes, _shown(numbers, channels))
             axes.set_title(channels)
@@ -298,8 +302,8 @@ def computing_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
     accuracies = [cell['accuracy_at_s'][f'{AT_S:.1f}'] for _, _, cell in cells]
     points = [(cell['latency_us']['median'], value) for (_, _, cell), value in zip(cells, accuracies, strict=True)]
     front = pareto_front(points)
-    title = f'Accuracy on the same track after {AT_S:g} s, by computing time'
-    with chart(path, (6.2, 7.4), title) as figure:
+    title = f'Accuracy after {AT_S:g} s by computing time. {_measured(numbers)}'
+    with chart(path, (6.2, 7.6), title) as figure:
         axes = figure.subplots()
         axes.step([points[at][0] for at in front], wrong_percent([points[at][1] for at in front]), where='post',
                   color='black', linewidth=1.0, zorder=1, label='Pareto front')  # fmt: skip

@@ -130,7 +130,12 @@ COMPARED = (*RECIPES, PEER, PAPER)
 UNKNOWN_TO = (*RECIPES, 'any-place', 'any-place-and-taxels')
 TRAINED_ON, TESTED_ON, DISTURBED = SELECTED = '1-30', '31-40', '32,35,38'
 DISTURBED_DATA = f'{DATA["biotac20"]}; disturbances are computed on the recorded signals'
-LEFT_OUT, DRAWS, UNKNOWN_S = 5, 10, 2.5  # materials left out in each draw, and sliding after which they are counted
+MATERIALS, LEFT_OUT, DRAWS, UNKNOWN_S = (
+    20,
+    5,
+    10,
+    2.5,
+)  # all materials, materials left out in each draw, and sliding after which they are counted
 SPLIT = (
     f'BioTac, trained on slides {TRAINED_ON}, tested on {TESTED_ON}; disturbed: {DISTURBED}; unknown: {DRAWS} draws of '
     f'{LEFT_OUT} materials that are not trained, slides of {UNKNOWN_S:g} s'
@@ -262,16 +267,23 @@ LINES: Mapping[str, tuple[str, str, str]] = {
 
 def failures_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
     """Draw the accuracy of three methods under each disturbance, how ours ends, and unknown materials accepted."""
-    with chart(path, (6.0, 14.2)) as figure:
+    ends = numbers[OURS]['outcomes']
+    clean, changed = (ends[row]['slides'] for row in (UNDISTURBED, ROWS['gain'].name(GAINS[0])))
+    trained, tested, of_disturbed = (text.replace('-', '–').replace(',', ', ') for text in SELECTED)
+    title = (
+        f'BioTac (biotac20), {MATERIALS} materials, same track: slides {trained} of each trained; tested without '
+        f'disturbance (none, 1): {tested}, n = {clean}; with one: {of_disturbed}, n = {changed} each'
+    )
+    with chart(path, (6.0, 14.8), title) as figure:
         grid = figure.subplots(10, 2, height_ratios=[1.0, 0.55] * 4 + [0.55, 0.05], sharey='row')
         panels = [*zip(grid[::2].flat, grid[1::2].flat, strict=True)]
         for unused in (*panels.pop(), *panels.pop()):
             unused.remove()
-        trained = trained_ranges(load_recipe(OURS).augmentation)
+        covered = trained_ranges(load_recipe(OURS).augmentation)
         for (lines, strip), (name, sweep) in zip(panels, ROWS.items(), strict=False):
-            _draw_sweep(lines, strip, sweep, numbers, trained.get(name))
+            _draw_sweep(lines, strip, sweep, numbers, covered.get(name))
             lines.set_title(sweep.title)
-        _draw_unknown(figure.add_subplot(grid[0, 0].get_gridspec()[8, :]), numbers['unknown_materials'])
+        _draw_unknown(figure.add_subplot(grid[0, 0].get_gridspec()[8, :]), numbers['unknown_materials'], clean)
         for lines, strip in zip(grid[:8:2, 0], grid[1:8:2, 0], strict=True):
             lines.set_ylabel('accuracy (%)')
             strip.set_ylabel('slides (%)')
@@ -318,14 +330,16 @@ def _draw_sweep(
                               for strength, name in rows], rotation=60 if crowded else 0)  # fmt: skip
 
 
-def _draw_unknown(panel: Any, unknown: Mapping[str, Mapping[str, Any]]) -> None:
+def _draw_unknown(panel: Any, unknown: Mapping[str, Mapping[str, Any]], tested: int) -> None:
     """Draw the fraction of slides over unknown materials that each recipe accepts, with its draws."""
     for place, found in enumerate(unknown.values()):
         accepted = 100 * np.array(found['accepted'])
         panel.barh(place, accepted.mean(), 0.6, color=WRONG)
         panel.plot(accepted, np.full(len(accepted), place), '.', color='black')
     panel.set_yticks(range(len(unknown)), list(unknown))
-    panel.set(title='unknown materials: mean and each choice', xlabel='accepted (%)')
+    of_each = tested // MATERIALS * LEFT_OUT
+    panel.set_title(f'unknown: {DRAWS} choices of {LEFT_OUT} materials, n = {of_each} slides each')
+    panel.set(xlabel='accepted (%), mean and each')
 
 
 def _draw_ends(strip: Any, accuracies: Array) -> None:

@@ -31,7 +31,7 @@ def test_a_recipe_is_cross_validated_from_the_command_line(bags: Path, tmp_path:
     arguments = ['cross-validate', 'stratified:2', 'peaks-naive-bayes', str(bags), '--json', str(figures)]
     assert main(arguments) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "recipe 'peaks-naive-bayes', split stratified:2: 2 surfaces; same track"
+    assert lines[0] == "recipe 'peaks-naive-bayes', split stratified:2: 2 surfaces; same bag; place not compared"
     assert [line.split()[0] for line in lines[2:5]] == ['1', '2', 'all']
     written = json.loads(figures.read_text())
     assert written['n_slides'] == 8

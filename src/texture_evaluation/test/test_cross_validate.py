@@ -3,6 +3,7 @@
 import argparse
 import json
 import socket
+from collections.abc import Iterator
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
@@ -10,8 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from foreign_tables import MAPPING, recordings, write_csv
+from matplotlib.figure import Figure
 from scipy.stats import beta
-from sklearn.model_selection import GroupShuffleSplit, LeaveOneGroupOut, StratifiedGroupKFold
+from sklearn.model_selection import GroupShuffleSplit, LeaveOneGroupOut, PredefinedSplit, StratifiedGroupKFold
 
 from texture_core.config import write_json
 from texture_core.errors import InvalidData, InvalidParameter
@@ -24,6 +26,7 @@ from texture_evaluation.cross_validation import (
     FoldResult,
     clustered,
     compare,
+    comparison_chart,
     cross_validate,
     dask_backend,
     interval,
@@ -194,11 +197,27 @@ def test_a_surface_of_one_session_trains_but_is_not_tested() -> None:
     assert "trained but not tested, as no other slide would train them: 'cork' (6 slides)" in table(result, 'x')
 
 
+class ByDay:
+    """A splitter of a user's own, which leaves a third of the slides of each surface out at a time."""
+
+    def split(self, X: object, y: object, groups: object = None) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Yield the slides that train and those that test."""
+        days = np.arange(24) // len(TONES_HZ) % 3
+        for day in range(3):
+            yield np.flatnonzero(days != day), np.flatnonzero(days == day)
+
+
+RANDOM = GroupShuffleSplit(4, test_size=0.5, random_state=0)
+OVER_CLUSTERS = 'clusters (surface × what was left out)'
+
+
 @pytest.mark.parametrize(
     ('splitter', 'groups', 'shift', 'clusters'),
     [
-        (LeaveOneGroupOut(), 'speed', 'other speed', 12),  # four surfaces, three speeds
-        (GroupShuffleSplit(4, test_size=0.5, random_state=0), 'slide', 'same track', None),
+        (LeaveOneGroupOut(), 'speed', 'other speed; bag not given; place not compared', 12),  # 4 surfaces, 3 speeds
+        (RANDOM, 'slide', 'bag not given; place not compared', None),
+        (ByDay(), 'slide', 'bag not given; place not compared', 12),
+        (PredefinedSplit(np.arange(24) // 4 % 3), 'slide', 'bag not given; place not compared', 12),
     ],
 )
 def test_slides_of_what_was_left_out_are_one_cluster_of_the_interval(
@@ -210,8 +229,31 @@ def test_slides_of_what_was_left_out_are_one_cluster_of_the_interval(
     distinct = len({name for fold in result.folds for name in fold.results})  # a slide that is tested twice is one
     assert distinct < figures['n_slides'] or clusters
     assert figures['n_clusters'] == (clusters or distinct)
+    assert figures['intervals_over'] == (OVER_CLUSTERS if clusters else 'slides')
     assert figures['slide_accuracy_interval'] == [pytest.approx(0.05 ** (1 / figures['n_clusters'])), 1.0]
-    assert f'surfaces; {shift}' in table(result, 'x')[0]
+    lines = table(result, 'x')
+    assert f'surfaces; {shift}' in lines[0]
+    assert any(
+        line.startswith(f'95 % intervals over {figures["n_clusters"]} {figures["intervals_over"]}: ') for line in lines
+    )
+
+
+@pytest.mark.parametrize(
+    ('bags', 'splitter', 'groups', 'shift'),
+    [
+        (['a'], StratifiedGroupKFold(2), 'slide', 'same bag; place not compared'),
+        (['a', 'a', 'b'], StratifiedGroupKFold(2), 'slide', 'same bag; place not compared'),
+        (['a', 'b'], LeaveOneGroupOut(), 'session', 'other bag; place not compared'),
+        (['a', 'b', 'c'], ByDay(), 'slide', 'other bag; place not compared'),
+        (['a', ''], StratifiedGroupKFold(2), 'slide', 'bag not given; place not compared'),
+        (['a', 'b', 'b'], LeaveOneGroupOut(), 'speed', 'other speed; same and other bag; place not compared'),
+    ],
+)
+def test_of_the_shift_only_what_is_certain_is_claimed(
+    bags: list[str], splitter: object, groups: str, shift: str
+) -> None:
+    slides = [replace(one, bag=Path(bags[row // 4 % len(bags)])) for row, one in enumerate(tones())]
+    assert cross_validate(RECIPE, SlideDataset(tuple(slides)), splitter, groups=groups).shift == shift
 
 
 def test_a_fold_without_two_surfaces_to_train_on_is_named() -> None:
@@ -365,6 +407,18 @@ def test_progress_counts_the_folds(monkeypatch: pytest.MonkeyPatch) -> None:
     )
     result = cross_validate(RECIPE, tones(), LeaveOneGroupOut(), groups='speed')
     assert seen == [(f"cross-validate '{RECIPE.name}', folds", len(result.folds))]
+
+
+def test_axes_end_at_100_percent_and_lines_that_coincide_are_both_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn = []
+    monkeypatch.setattr(Figure, 'savefig', lambda figure, *_, **__: drawn.append(figure))
+    one = cross_validate(RECIPE, tones(), StratifiedGroupKFold(2))
+    comparison_chart([one, replace(one, recipe='other')], 'title', 'figure.png')
+    accuracies, times = drawn[0].axes
+    assert accuracies.get_xlim()[1] == times.get_ylim()[1] == 100.0
+    below, above = times.get_lines()
+    np.testing.assert_array_equal(below.get_ydata(), above.get_ydata())
+    assert below.get_linewidth() >= 2 * above.get_linewidth()
 
 
 def test_slides_of_one_place_are_one_case_of_the_test() -> None:

@@ -171,7 +171,11 @@ def test_distinct_surfaces_are_recognised_and_the_figures_agree_with_each_other(
     evaluated: TextureModel, simulated: Path
 ) -> None:
     figures = evaluate(evaluated, [simulated], '5-6').as_json()
-    assert (figures['shift'], figures['trained_on'], figures['n_slides']) == ('same session', [], 6)
+    assert (figures['shift'], figures['slides_in_training'], figures['n_slides']) == (
+        'same bag; place not compared',
+        [],
+        6,
+    )
     assert figures['n_slides_at_s'] == {'0.5': 6, '1.0': 6, '2.5': 0, '5.0': 0}
     assert figures['slide_accuracy_interval'] == [pytest.approx(0.05 ** (1 / 6)), 1.0]
     table = np.array(figures['confusion'])
@@ -194,8 +198,8 @@ def test_slides_of_the_training_are_named_whatever_their_bag_is_called(
     for bag in simulated.iterdir():
         shutil.copytree(bag, copies / f'{bag.name}_again')
     report = evaluate(evaluated, [copies], '4-6')
-    assert report.trained_on == ('glass/4', 'leather/4', 'ridge_2mm_deep/4')
-    assert report.shift == 'other session'
+    assert report.slides_in_training == ('glass/4', 'leather/4', 'ridge_2mm_deep/4')
+    assert report.shift == 'other bag; place not compared'
     assert '3 of 9 slides were in the training' in '\n'.join(report_summary(report))
 
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import matplotlib as mpl
@@ -29,6 +30,7 @@ STYLE: Any = {
 DPI = 150
 MARGIN_IN = 0.12  # around a figure
 PHONE_PX, TEXT_PX = 380, 9.2  # the text of a chart that is as wide as the page on a phone
+TITLE_CHARACTERS = 116  # bold ones of 1 point in 1 inch, on average
 CHART_FORMATS = ('.png', '.svg', '.pdf')
 REDUCED = 'REDUCED, not for publishing'
 is_reduced = ContextVar('is_reduced', default=False)  # whether what runs has fewer slides than its published figures
@@ -72,7 +74,8 @@ def chart(path: str | Path, size: tuple[float, float], title: str = '') -> Itera
         figure = Figure(figsize=size, layout='constrained')
         FigureCanvasAgg(figure)
         if title:
-            figure.suptitle(title, x=0.02, ha='left', fontweight='bold')
+            lines = fill(title, round(TITLE_CHARACTERS * size[0] / points))
+            figure.suptitle(lines, x=0.02, ha='left', fontweight='bold')
         if is_reduced.get():
             figure.text(0.5, 0.5, REDUCED, color='red', fontsize=16, rotation=30, ha='center', va='center')
         yield figure

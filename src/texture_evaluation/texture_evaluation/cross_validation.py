@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from importlib.metadata import version
@@ -17,7 +17,7 @@ import numpy as np
 from joblib import Parallel, delayed, parallel_config
 from numpy.typing import NDArray
 from scipy.stats import binomtest
-from sklearn.model_selection import GroupShuffleSplit, LeaveOneGroupOut, StratifiedGroupKFold
+from sklearn.model_selection import GroupShuffleSplit, LeaveOneGroupOut, PredefinedSplit, StratifiedGroupKFold
 from threadpoolctl import threadpool_limits
 
 from texture_core.cli import progress
@@ -229,14 +229,20 @@ class ChronologicalSplit:
 # --------------------
 # The outcome of a cross-validation.
 
-SAME_TRACK, SAME_SESSION, OTHER_SESSION = 'same track', 'same session', 'other session'
-# The shift between training and test where this condition is on one side only; other splits test the same track.
+# The shift between training and test where this condition is on one side only.
 SHIFTS: Mapping[str, str] = {
-    'place': 'other place',
-    'session': OTHER_SESSION,
     'sensor': 'other finger',
-    **{name: f'other {name}' for name in ('speed', 'force', 'direction', 'motion')},
+    **{name: f'other {name}' for name in ('place', 'speed', 'force', 'direction', 'motion')},
 }
+NO_PLACE = 'place not compared'  # positions may be missing, and a specimen may have been moved
+
+
+def bags_compared(pairs: Iterable[tuple[Collection[str], Collection[str]]]) -> str:
+    """Return whether the tested bags, the second of each pair, are among the trained ones, by their names."""
+    same = {bag in trained if bag and trained else None for trained, tested in pairs for bag in tested}
+    if None in same:
+        return 'bag not given'  # arrays without a session, or a model without a list of its bags
+    return ' and '.join(word for word, there in (('same', True), ('other', False)) if there in same) + ' bag'
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,8 +263,9 @@ class CrossValidation:
     labels: tuple[str, ...]
     folds: tuple[FoldResult, ...]
     unusable: tuple[str, ...] = ()
-    shift: str = SAME_TRACK
+    shift: str = NO_PLACE
     clusters: Mapping[str, str] = field(default_factory=dict)
+    intervals_over: str = 'slides'
     untested: Mapping[str, int] = field(default_factory=dict)
 
     @property
@@ -294,6 +301,7 @@ class CrossValidation:
             'version': version('texture_evaluation'),
             'shift': self.shift,
             'too_little_training': self.too_little_training,
+            'intervals_over': self.intervals_over,
             **self.figures(self.folds),
             'labels': list(self.labels),
             'confusion': metrics.confusion(self.pooled, self.labels).tolist(),
@@ -429,12 +437,13 @@ def comparison_chart(results: Sequence[CrossValidation], title: str, path: str |
     with chart(path, (6.0, 5.0 + 0.5 * len(results)), title) as figure:
         accuracies, times = figure.subplots(2, 1, height_ratios=(1.4 + 0.5 * len(results), 3.6))
         _draw_accuracies(accuracies, results)
-        for result, style in zip(results, line_styles(), strict=False):
+        widths = np.linspace(3.0 * len(results), 2.0, len(results))  # of lines that coincide each is seen
+        for result, style, width in zip(results, line_styles(), widths, strict=False):
             seconds, accuracy = curve(result.pooled)
-            times.plot(seconds, 100 * accuracy, label=result.recipe, marker='.', **style)
+            times.plot(seconds, 100 * accuracy, label=result.recipe, linewidth=width, clip_on=False, **style)
         times.set(xlabel='sliding time used (s), as far as all slides reach', ylabel='accuracy of slides (%)')
-        times.set(xlim=(0, None), ylim=(None, 101))
-        times.legend(loc='best')
+        times.set(xlim=(0, None), ylim=(None, 100))
+        figure.legend(*times.get_legend_handles_labels(), loc='outside lower left')
     return Path(path)
 
 
@@ -446,11 +455,11 @@ def _draw_accuracies(axes: Any, results: Sequence[CrossValidation]) -> None:
         edges = 100 * np.array([one[f'{kind}_accuracy_interval'] for one in figures]).T
         errors = np.maximum([accuracies - edges[0], edges[1] - accuracies], 0.0)
         axes.errorbar(
-            accuracies, rows + offset, xerr=errors, fmt=marker, color=colour, capsize=3, label=f'{name}, 95 % interval'
+            accuracies, rows + offset, xerr=errors, fmt=marker, color=colour, capsize=3, label=name, clip_on=False
         )
     axes.set_yticks(rows, [result.recipe for result in results])
-    axes.set(xlabel='accuracy (%)', xlim=(None, 101), ylim=(len(results) - 0.5, -0.5))
-    axes.legend(loc='best')
+    axes.set(xlabel='accuracy (%) and 95 % interval', xlim=(None, 100), ylim=(len(results) - 0.5, -0.5))
+    axes.legend(loc='lower left', bbox_to_anchor=(0, 1), ncols=2)
 
 
 # --------------------
@@ -672,11 +681,22 @@ def cross_validate(
     )
     folds = list(progress(done, f"cross-validate '{recipe.name}', folds", len(named)))
     usable = set(tested.groups.tolist())
-    shift = SHIFTS.get(groups, SAME_TRACK) if isinstance(groups, str) else 'other group'
-    of_slides = shift == SAME_TRACK
+    # What is certain of the shift: the condition that was left out, and the bags.
+    left_out = SHIFTS.get(groups, '') if isinstance(groups, str) else 'other group'
+    sessions = np.array([slide.session for slide in dataset])
+    bags = bags_compared((set(sessions[train_rows]), set(sessions[test_rows])) for train_rows, test_rows in splits)
+    place = '' if left_out == SHIFTS['place'] else NO_PLACE
+    shift = '; '.join(filter(None, (left_out, bags, place)))
+    # Slides that were left out together are no independent draws; a splitter of a user's own may group by anything.
+    grouped: list[Any] = columns.tolist()
+    by_slide = isinstance(groups, str) and groups == 'slide'
+    known = type(splitter).__module__.startswith('sklearn.') and not isinstance(splitter, PredefinedSplit)
+    if by_slide and not (known or isinstance(splitter, ChronologicalSplit)):
+        by_slide = False
+        grouped = [[fold for fold, (_, rows) in enumerate(splits, 1) if row in rows] for row in range(len(dataset))]
     clusters = [
-        slide.whole_name if of_slides else f'{slide.surface} {group}'
-        for slide, group in zip(dataset, columns.tolist(), strict=True)
+        slide.whole_name if by_slide else f'{slide.surface} {group}'
+        for slide, group in zip(dataset, grouped, strict=True)
     ]
     return CrossValidation(
         recipe.name,
@@ -685,6 +705,7 @@ def cross_validate(
         tuple(name for name in names.tolist() if name not in usable),
         shift,
         dict(zip(names.tolist(), clusters, strict=True)),
+        'slides' if by_slide else 'clusters (surface × what was left out)',
         dict(Counter(dataset.labels[sorted(untested)].tolist())),
     )
 

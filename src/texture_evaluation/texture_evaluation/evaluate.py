@@ -18,11 +18,10 @@ from texture_estimation.evidence import EvidenceAccumulator, single_decisions
 from texture_estimation.model import TextureModel
 from texture_evaluation import metrics
 from texture_evaluation.cross_validation import (
-    OTHER_SESSION,
-    SAME_SESSION,
-    SAME_TRACK,
+    NO_PLACE,
     CrossValidation,
     PairedComparison,
+    bags_compared,
     figures,
 )
 from texture_evaluation.metrics import SlideResult
@@ -43,8 +42,8 @@ class EvaluationReport:
     latency_us: Array
     unusable: tuple[str, ...] = ()
     tare_faults: tuple[str, ...] = ()
-    shift: str = ''
-    trained_on: tuple[str, ...] = ()
+    shift: str = NO_PLACE
+    slides_in_training: tuple[str, ...] = ()  # of the tested ones, by their samples
     clusters: Sequence[str] | None = None
     too_little_training: str = ''  # how many slides there are and how many are needed
 
@@ -65,7 +64,7 @@ class EvaluationReport:
         wrong, rejected = metrics.accepted_wrong(self.known), metrics.rejected(self.known)
         return {
             'shift': self.shift,
-            'trained_on': list(self.trained_on),
+            'slides_in_training': list(self.slides_in_training),
             'too_little_training': self.too_little_training,
             **figures(self.known, self.clusters),
             'early': metrics.early_decision(self.known) if self.known else nothing,
@@ -114,8 +113,6 @@ def evaluate_dataset(model: TextureModel, dataset: SlideDataset) -> EvaluationRe
     if not results:
         raise no_window(dataset, model.recipe.feature_set)
     sessions, digests = (model.training.get(name, ()) for name in ('sessions', 'slide_digests'))
-    there = [slide.session in sessions for slide in results]
-    crossed = SAME_SESSION if all(there) else OTHER_SESSION if not any(there) else f'{SAME_SESSION} and {OTHER_SESSION}'
     known = [slide for slide in results if slide.surface in model.labels]
     return EvaluationReport(
         labels=model.labels,
@@ -124,8 +121,8 @@ def evaluate_dataset(model: TextureModel, dataset: SlideDataset) -> EvaluationRe
         latency_us=np.concatenate([latency for _, latency in tested.values()]),
         unusable=tuple(slide.name for slide in tested if slide not in results),
         tare_faults=tuple(dataset.tare_faults(model.recipe.feature_set)),
-        shift=crossed if sessions else '',
-        trained_on=tuple(slide.name for slide in results if slide_digest(slide) in digests),
+        shift=f'{bags_compared([(sessions, [slide.session for slide in results])])}; {NO_PLACE}',
+        slides_in_training=tuple(slide.name for slide in results if slide_digest(slide) in digests),
         too_little_training=model.acceptance.reason,
         clusters=[one.name if one.session in sessions else f'{one.surface} {one.session}' for one in known],
     )
@@ -239,8 +236,7 @@ def table(result: CrossValidation, split: str) -> list[str]:
         for title, key in COLUMNS.items()
         if figures[key] is not None
     )
-    whole = 'slides' if result.shift == SAME_TRACK else 'clusters (surface × what was left out)'
-    lines.append(f'95 % intervals over {figures["n_clusters"]} {whole}: {"; ".join(intervals)}')
+    lines.append(f'95 % intervals over {figures["n_clusters"]} {result.intervals_over}: {"; ".join(intervals)}')
     lines.append(by_reason(figures['rejections']))
     if result.untested:
         names = ', '.join(f"'{surface}' ({count} slides)" for surface, count in result.untested.items())
@@ -260,7 +256,12 @@ def by_reason(rejections: Mapping[str, int]) -> str:
     return f'slides rejected at the end: {counts or "none"}'
 
 
-ENDS = {'accepted and correct': 'accepted_correct', 'accepted but wrong': 'accepted_wrong', 'rejected': 'rejected'}
+ENDS = {
+    'accuracy': 'slide_accuracy',
+    'accepted and correct': 'accepted_correct',
+    'accepted but wrong': 'accepted_wrong',
+    'rejected': 'rejected',
+}
 
 
 def summary(report: EvaluationReport) -> list[str]:
@@ -274,7 +275,7 @@ def summary(report: EvaluationReport) -> list[str]:
     early, latency = figures['early'], figures['latency_us']
     lines = [
         f'slides: {len(report.known)} over trained surfaces, {len(report.unknown)} over others',
-        *([f'training and test, by the names of the bags: {report.shift}'] if report.shift else []),
+        f'training and test, by the names of the bags: {report.shift}',
         *(
             [
                 f'accuracy of single windows: {percent(figures["window_accuracy"])}',
@@ -300,10 +301,10 @@ def summary(report: EvaluationReport) -> list[str]:
     if report.unknown:
         accepted, rejected = percent(figures['unknown_accepted']), by_reason(figures['rejections_of_untrained'])
         lines.append(f'of the {len(report.unknown)} slides over other surfaces: accepted {accepted}; {rejected}')
-    if report.trained_on:
+    if report.slides_in_training:
         lines.append(
-            f'{len(report.trained_on)} of {len(report.known)} slides were in the training, so these figures are '
-            'optimistic; leave them out with --slides'
+            f'{len(report.slides_in_training)} of {len(report.known)} slides were in the training, so these figures '
+            'are optimistic; leave them out with --slides'
         )
     return [*lines, *_unusable(report.unusable), *report.tare_faults, *filter(None, [report.too_little_training])]
 

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from contextlib import nullcontext
 from importlib.metadata import version
 from itertools import takewhile
+from pathlib import Path
 
 from texture_core.cli import Command, add_dask, add_seed, add_slides, core_count
 from texture_core.config import refuse_inputs, shipped, write_json
@@ -98,8 +99,9 @@ def _cross_validate(options: argparse.Namespace) -> int:
         setting = {'split': split.name, 'seed': options.seed, 'bags': bags, 'slides': options.slides or 'all'}
         write_json({**setting, **(figures[0] if len(figures) == 1 else several)}, options.json)
     if options.chart:
-        title = f'{len(dataset)} slides of {len(results[0].labels)} surfaces, split {split.name}, {results[0].shift}'
-        print(comparison_chart(results, title, options.chart))
+        of = ', '.join(Path(bag).name for bag in bags)
+        title = f'{of}: {len(dataset)} slides of {len(results[0].labels)} surfaces, split {split.name}'
+        print(comparison_chart(results, f'{title}; {results[0].shift}', options.chart))
     return 0
 
 
