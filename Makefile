@@ -35,7 +35,7 @@ demo: setup
 
 lint: setup
 	@$(RUN) ruff check .
-	@$(RUN) ruff format --check .
+	@$(RUN) ruff format --check . || { echo 'to format all files: $(RUN) ruff format .'; exit 1; }
 	@$(RUN) mypy
 	@$(RUN) python tools/figures.py --check
 	@$(RUN) python tools/words.py > /dev/null || $(RUN) python tools/words.py

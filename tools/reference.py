@@ -384,6 +384,11 @@ def sensors(root: Path) -> str:
     """Return a table of the sensors, several of which are one class, from the comments of their catalogue."""
     text = (root / 'src/texture_drivers/texture_drivers/catalogue.py').read_text(encoding='utf-8')
     commented = dict(re.findall(r"^    '(\w+)': .*,  # (.+)$", text, re.MULTILINE))
+    missing = sorted(SENSORS.keys() - commented.keys())
+    if missing:
+        raise SystemExit(
+            f'{", ".join(missing)}: say what the sensor is in a comment behind its line of texture_drivers/catalogue.py'
+        )
     rows = ['| name | what it is |', '|---|---|', *(f'| `{name}` | {commented[name]} |' for name in SENSORS)]
     return '\n'.join(rows) + '\n'
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import ast
 import re
-from collections import Counter
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -74,7 +73,7 @@ def test_no_two_files_of_tests_meet_on_one(pattern: re.Pattern[str]) -> None:
         for number in pattern.findall(path.read_text()):
             files.setdefault(number, set()).add(path.name)
     shared = {number: names for number, names in files.items() if len(names) > 1 and number not in SHARED_ADDRESSES}
-    assert not shared
+    assert not shared, f'give each of these files a number that no other file has: {shared}'
 
 
 def test_the_domains_of_tests_are_those_that_no_demonstration_takes() -> None:
@@ -92,7 +91,11 @@ def public_classes(text: str) -> set[str]:
 def test_no_two_public_classes_of_the_suite_have_the_same_name() -> None:
     """The name of a class is unambiguous without looking at its import."""
     modules = [path for root in ('src', 'tools') for path in (ROOT / root).rglob('*.py')]
-    code = [path for path in modules if 'test' not in path.parts and not path.name.startswith('test_')]
-    counts = Counter(name for path in code for name in public_classes(path.read_text(encoding='utf-8')))
-    assert counts['WindowParams'] == 1
-    assert not {name: count for name, count in counts.items() if count > 1}
+    files: dict[str, list[str]] = {}
+    for path in modules:
+        if 'test' not in path.parts and not path.name.startswith('test_'):
+            for name in public_classes(path.read_text(encoding='utf-8')):
+                files.setdefault(name, []).append(str(path.relative_to(ROOT)))
+    assert 'WindowParams' in files
+    shared = [f'{name} in {" and ".join(paths)}' for name, paths in files.items() if len(paths) > 1]
+    assert not shared, f'rename all but one class of each name: {"; ".join(shared)}'

@@ -106,6 +106,13 @@ def test_figures_of_the_papers_are_those_of_the_charts(site: Path) -> None:
     assert all(f'{regressor["unseen"]["error"]:.2f}' in page for regressor in regressors.values())
 
 
+def free_port() -> int:
+    """Return a UDP port on which nothing listens."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(('127.0.0.1', 0))
+        return int(probe.getsockname()[1])
+
+
 @pytest.fixture
 def examples(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """Write the examples of the page on extending into a package."""
@@ -121,9 +128,7 @@ def examples(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 def test_the_sensor_of_the_page_delivers_and_counts_what_is_lost(examples: Path) -> None:
     finger_class = importlib.import_module('my_textures.udp_finger').UdpFinger
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-        sender.bind(('127.0.0.1', 0))
-        port = sender.getsockname()[1]
+    port = free_port()
     finger = finger_class(SensorParams(device=str(port)), time.time_ns)
     finger.open()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
@@ -146,6 +151,10 @@ def test_the_files_that_the_page_on_extending_names_exist() -> None:
 
 
 def test_the_emulated_sensor_of_the_page_passes_its_test(examples: Path) -> None:
+    path = examples / 'test_udp_finger.py'
+    text = path.read_text()
+    assert text.count('port = 5006 ') == 1
+    path.write_text(text.replace('port = 5006 ', f'port = {free_port()} '))
     module = importlib.import_module('my_textures.test_udp_finger')
     module.test_a_slide_arrives_as_it_was_sent_and_a_lost_datagram_is_counted()
 

@@ -36,4 +36,5 @@ if __name__ == '__main__':
         print(f'{count:6d} {path}')
     total = sum(counts.values())
     print(f'{total:6d} words on {len(counts)} pages; at most {MOST_WORDS} on {MOST_PAGES}')
-    sys.exit(total > MOST_WORDS or len(counts) > MOST_PAGES)
+    if total > MOST_WORDS or len(counts) > MOST_PAGES:
+        sys.exit('too much: shorten a page, or raise MOST_WORDS or MOST_PAGES in tools/words.py')

@@ -36,7 +36,7 @@ PLAN = SlidePlan(slides=26, slide_s=1.6, speed_m_s=0.05, force_n=1.0)
 WINDOWS = {'length_s': 0.04, 'hop_s': 0.02}  # shorter than those of `default`, so that the evidence is seen to grow
 RATE_HZ, FRAMES_PER_S, HOLD_S = 1000.0, 12, 2.0
 SLOWER = 1.5  # than real
-GREEN, RED, GREY = '#00704a', '#b3331f', '#9a9a9a'
+GREEN, RED = '#00704a', '#b3331f'
 OUT = Path(__file__).with_name('recognition.gif')
 
 

@@ -25,6 +25,7 @@ TWO = ('glass', 'ridge_2mm_deep')
 # A busy machine may hold up an emulated robot for longer than a real one is allowed to be silent.
 PATIENT = {'state_timeout_s': 2.0, 'signal_timeout_s': 3.0, 'estimate_timeout_s': 10.0}
 START_S = 90.0
+LISTENED = ('exploration', 'features')  # topics to which the nodes that estimate subscribe
 
 
 @pytest.fixture(scope='session')
@@ -49,15 +50,17 @@ class Launched(ChildLauncher):
 
     ending: ExitStack
 
-    def operator(self, namespace: str = '', *, senses: bool = True) -> Any:
-        """Return a client of the nodes of a namespace, once they explore and estimate and, if it senses, measure."""
+    def operator(self, namespace: str = '', *, senses: bool = True, listened: tuple[str, ...] = LISTENED) -> Any:
+        """Return a client of the nodes of a namespace, once they explore, estimate and, if it senses, measure."""
         from texture_bringup.operator import Operator  # noqa: PLC0415  # pure tests have no ROS
 
         operator = self.ending.enter_context(Operator(namespace, guard=self.check))
         operator.wait_for_explorer(START_S)
         if senses:
             operator.wait_for_signal(START_S)
-        operator.wait_for_listeners(('exploration', 'features'), 1, self.check)
+        count, missing = operator._node.count_subscribers, f'no node subscribes to one of {", ".join(listened)}'
+        operator.wait_until(lambda: all(count(topic) for topic in listened), START_S, missing)
+        operator._settle()  # the others discover them, too
         return operator
 
 

@@ -78,9 +78,7 @@ def emulator(launched, folder, roughness_model, port):
 
 @pytest.fixture(scope='module')
 def operator(emulator):
-    operator = emulator.operator('left')
-    operator.wait_for_listeners(('roughness_features',), 1, emulator.check)  # who grades
-    return operator
+    return emulator.operator('left', listened=('exploration', 'features', 'roughness_features'))
 
 
 @pytest.fixture(scope='module')

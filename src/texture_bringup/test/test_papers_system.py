@@ -5,13 +5,13 @@
 import os
 import re
 import shlex
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
-import yaml
 
 pytestmark = [pytest.mark.benchmark, pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
@@ -19,7 +19,6 @@ os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 from texture_bringup.command import main
 from texture_bringup.commands.explore import REJECTED
-from texture_bringup.launcher import ChildLauncher
 from texture_bringup.operator import Operator
 from texture_core.config import find_file
 from texture_core.types import FeatureVector
@@ -30,23 +29,10 @@ from texture_exploration.presets import load_preset
 from texture_features.feature_set import LabelledFeatures
 
 DOMAIN = 87
-DEADLINE_S = 60.0
+Launch = Callable[..., AbstractContextManager[Any]]
 TRIES = 3  # a sample that a busy machine loses costs the only window of a slide
 # This machine may be busy; a late command is caught up with, which looks fast.
-PATIENT = {'estimate_timeout_s': 20.0, 'signal_timeout_s': 3.0, 'state_timeout_s': 1.5, 'peak_speed_fraction': 5.0}
-
-
-@contextmanager
-def launched(file: str, given: Mapping[str, object], out: Path) -> Iterator[Operator]:
-    """Start a launch file, and wait until what it moves is estimated."""
-    (out / 'patient.yaml').write_text(yaml.safe_dump({'/**': {'ros__parameters': PATIENT}}))
-    own = {'devices': out, 'explorer_params': out / 'patient.yaml'}
-    domain = {'ROS_DOMAIN_ID': str(DOMAIN), 'ROS_LOG_DIR': str(out)}
-    launcher = ChildLauncher(file, {**own, **given}, {**os.environ, **domain}, out / 'nodes.log')
-    with launcher, Operator(domain_id=DOMAIN, guard=launcher.check) as operator:
-        operator.wait_for_explorer(DEADLINE_S)
-        operator.wait_for_listeners(('features', 'exploration'), 1, launcher.check)
-        yield operator
+PATIENT = {'estimate_timeout_s': 20.0, 'peak_speed_fraction': 5.0}
 
 
 def slide(operator: Operator, surface: str) -> tuple[str, list[FeatureVector]]:
@@ -59,10 +45,13 @@ def slide(operator: Operator, surface: str) -> tuple[str, list[FeatureVector]]:
     raise AssertionError('no slide had a window')
 
 
-def test_the_running_classifier_learns_a_new_object_online_slide_by_slide_as_kaboli_et_al_do(tmp_path: Path) -> None:
+def test_the_running_classifier_learns_a_new_object_online_slide_by_slide_as_kaboli_et_al_do(
+    launched: Launch, tmp_path: Path
+) -> None:
     recipe = find_file('kaboli-pa', 'texture_estimation', 'config/recipes', 'recipe')
     given = {'sensor': 'biotac', 'recipe': recipe, 'scene': 'kaboli', 'surface': 'orange', 'watch_signal': False}
-    with launched('emulator', given, tmp_path) as operator:
+    with launched('emulator', DOMAIN, tmp_path, PATIENT, **given) as launcher:
+        operator = launcher.operator(senses=False)
         vectors, surfaces = [], {}
         for surface in ('orange', 'toothbrush'):
             operator.set_parameters('emulator', {'surface': surface})
@@ -85,12 +74,14 @@ LIVE = re.findall(r'^ {4}texture launch \w+ sensor:=.*(?:\n {4}.*)+', PAGE.read_
 
 @pytest.mark.parametrize('lines', LIVE, ids=[re.search(r'recipe:=(\S+)', lines)[1] for lines in LIVE])
 def test_the_live_lines_of_the_page_record_two_surfaces_and_train_a_model_as_printed(
-    lines: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    launched: Launch, lines: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv('ROS_DOMAIN_ID', str(DOMAIN))
     [launch, *orders] = [shlex.split(line, comments=True) for line in lines.splitlines()]
-    with launched(launch[2], dict(word.split(':=') for word in launch[3:]), tmp_path):
+    given = dict(word.split(':=') for word in launch[3:])
+    with launched(launch[2], DOMAIN, tmp_path, PATIENT, **given) as launcher:
+        launcher.operator(senses=False)
         for order in orders[:-1]:
             # No label is accepted without a model.
             assert main(order[1:]) == (REJECTED if order[1] == 'explore' else 0)

@@ -103,7 +103,6 @@ def subscribe(node: Node, feed: Feed, on_bad: Callable[[InvalidData], None]) -> 
 STEP_S = 0.1
 LEVEL_NAMES = {value: name for name, value in LEVELS.items()}
 CANCEL_DEADLINE_S = 10.0
-LISTENERS_DEADLINE_S = 60.0
 FEATURES_DEADLINE_S = 30.0
 # An explorer that explores sends feedback, and else its idle state once a second: silent for this long, it has ended or
 # hangs. ROS lists a killed one for another 20 s.
@@ -224,16 +223,6 @@ class Operator:
             )
         finally:
             self._node.destroy_subscription(subscription)
-
-    def wait_for_listeners(self, topics: Sequence[str], number: int, guard: Callable[[], None]) -> None:
-        """Wait until topics have `number` subscriptions and these are discovered; `guard` is called meanwhile."""
-
-        def all_listen() -> bool:
-            guard()
-            return all(self._node.count_subscribers(topic) >= number for topic in topics)
-
-        self.wait_until(all_listen, LISTENERS_DEADLINE_S, f'no node subscribes to {", ".join(topics)} yet')
-        self._settle()
 
     def watch_stops(self) -> Callable[[], bool]:
         """Return what says whether the explorer is told to stop from now on, between explorations, too."""

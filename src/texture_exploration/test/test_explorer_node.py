@@ -28,6 +28,7 @@ from texture_core.types import FingerReceiver, Phase, Rejection, TextureEstimate
 from texture_exploration.arms.arm import SurfaceFrame
 from texture_exploration.arms.simulated import SimulatedArm
 from texture_exploration.exploration import STILL_MOVING, ExplorationOutcome
+from texture_exploration.motions import MOTIONS
 from texture_exploration.nodes.explorer import STATIC_QOS, ExplorerNode
 
 QUICK = {'motion': 'linear_slide', 'speed_m_s': 0.1, 'distance_m': 0.02}
@@ -273,7 +274,7 @@ def test_a_request_may_name_a_motion_of_another_package_if_the_parameters_do(mak
     assert world.explored(**{**QUICK, 'motion': 'users_slides:slide'}).exploration_id
     response = world.explored(motion='users_slides:linear_slide')
     assert response.error_code == Result.ERROR_UNKNOWN_MOTION
-    assert 'Known: circular, cross_slide, in_hand_sliding, linear_slide, users_slides:slide' in response.message
+    assert f'Known: {", ".join(sorted((*MOTIONS, "users_slides:slide")))}' in response.message
 
 
 def cork(state, **values):

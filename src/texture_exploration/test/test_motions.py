@@ -24,9 +24,21 @@ def sliding(table):
     return [(s, p) for s, p in zip(table.states, table.places, strict=True) if s.phase is Phase.SLIDE]
 
 
-@pytest.mark.parametrize('name', MOTIONS)
-def test_a_motion_takes_the_numbers_that_it_says_it_takes(table, name):
-    assert table.explore(ExplorationRequest(name, **DEFAULTS[name])).success
+def test_every_motion_says_which_numbers_it_takes():
+    unlisted = set(MOTIONS) ^ set(DEFAULTS)
+    assert not unlisted, f'{sorted(unlisted)}: list each motion in both MOTIONS and DEFAULTS of motions.py'
+
+
+@pytest.mark.parametrize(('name', 'number'), [(name, number) for name in DEFAULTS for number in DEFAULTS[name]])
+def test_each_number_that_a_motion_takes_changes_what_the_finger_does(make_table, name, number):
+    def pressed(**numbers):
+        table = make_table()
+        assert table.explore(ExplorationRequest(name, **{**DEFAULTS[name], **numbers})).success
+        return table.places, table.pressed
+
+    assert pressed() == pressed()
+    changed = pressed(**{number: 0.9 * DEFAULTS[name][number]})
+    assert changed != pressed(), f'{name} ignores {number}: plan with it, or take it out of its DEFAULTS in motions.py'
 
 
 @pytest.mark.parametrize('name', MOTIONS)

@@ -55,7 +55,8 @@ ALIKE = (
     ('coffee_capsule', 'spray'),
     ('rough_star', 'toothbrush'),
 )
-SAME, DIFFERENT, ALL = TASKS = ('same shape', 'various shapes', 'all 20 objects')
+ALL = 'all 20 objects'
+TASKS = ('same shape', 'various shapes', ALL)
 SURFACES = (ROUND, VARIOUS, ROUND + VARIOUS)
 PAPER_SVM, PAPER_EM = (0.97, 0.975, 0.96), (0.8223, 0.835, 0.8058)
 PAPER_PA = 0.87  # t = 10, the average of the three sets

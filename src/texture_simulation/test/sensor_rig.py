@@ -30,26 +30,17 @@ from texture_simulation.devices.fingers import (
 
 DAQ = '{channels: [' + ', '.join(f'{{name: c{i}, unit: count}}' for i in range(8)) + ']}'
 Feed = Callable[[Any, int, int], None]
-DEVICES: Mapping[str, Callable[[Path, np.random.Generator], EmulatedDevice]] = {
-    'tsf85': EmulatedTsf85,
-    'tsf85_pair': EmulatedTsf85,
-    'tsf85_3x4': EmulatedTsf85,
-    'biotac': EmulatedBioTac,
-    'biotac_sp': EmulatedBioTac,
-    'biotac_hand': partial(EmulatedBioTac, serials=('BT-0', 'BT-1', 'BT-2')),
-    'daq': EmulatedDaq,
-    'pvdf': EmulatedPvdf,
-    'anyskin': EmulatedAnySkin,
-}
+MakeDevice = Callable[[Path, np.random.Generator], EmulatedDevice]
 
 
 @dataclass(frozen=True)
 class RigCase:
-    """How a device is fed, and how what arrives is to be read.
+    """A device, how it is fed, and how what arrives is to be read.
 
     Sample i of `topic` holds i and a constant, modulo `modulus`.
     """
 
+    device: MakeDevice
     topic: str  # The fast one
     # ticks_per_s, samples_per_tick: how often the device is fed, and how many samples that makes
     ticks_per_s: float
@@ -111,13 +102,13 @@ def tsf85(prefix: str = '', taxels: int = 28, fingers: int = 1) -> RigCase:
         f'{prefix}signal_static': 'count',
         f'{prefix}signal_imu': imu,
     }
-    return RigCase(f'{prefix}signal', 1000.0, 1, feed_tsf85(taxels, fingers), units, 1000)
+    return RigCase(EmulatedTsf85, f'{prefix}signal', 1000.0, 1, feed_tsf85(taxels, fingers), units, 1000)
 
 
-def biotac(prefix: str = '', slots: int = 44, fingers: int = 1) -> RigCase:
+def biotac(device: MakeDevice = EmulatedBioTac, prefix: str = '', slots: int = 44, fingers: int = 1) -> RigCase:
     """Return how a BioTac is fed."""
     units: dict[str, str | tuple[str, ...]] = {f'{prefix}signal': 'count', f'{prefix}signal_static': 'count'}
-    return RigCase(f'{prefix}signal', 4400 / slots, slots // 2, feed_biotac(slots, fingers), units, 4096)
+    return RigCase(device, f'{prefix}signal', 4400 / slots, slots // 2, feed_biotac(slots, fingers), units, 4096)
 
 
 CASES: Mapping[str, RigCase] = {
@@ -126,13 +117,15 @@ CASES: Mapping[str, RigCase] = {
     'tsf85_3x4': tsf85(taxels=12),
     'biotac': biotac(),
     'biotac_sp': biotac(slots=54),
-    'biotac_hand': biotac('finger2/', fingers=3),
-    'daq': RigCase('signal', 2500.0, 1, feed_alike(8), {'signal': 'count'}, 30_000, config=DAQ),
+    'biotac_hand': biotac(partial(EmulatedBioTac, serials=('BT-0', 'BT-1', 'BT-2')), 'finger2/', fingers=3),
+    'daq': RigCase(EmulatedDaq, 'signal', 2500.0, 1, feed_alike(8), {'signal': 'count'}, 30_000, config=DAQ),
     'pvdf': RigCase(
-        'signal', 4096.0, 1, feed_pvdf, {'signal': 'pC', 'signal_static': 'N'}, 30_000,
+        EmulatedPvdf, 'signal', 4096.0, 1, feed_pvdf, {'signal': 'pC', 'signal_static': 'N'}, 30_000,
         config='{film_gain_pc: 1.0, force_gain_n: 1.0}',
     ),
-    'anyskin': RigCase('signal', 250.0, 1, feed_alike(15), {'signal': 'µT'}, 30_000, config='{rate_hz: 250.0}'),
+    'anyskin': RigCase(
+        EmulatedAnySkin, 'signal', 250.0, 1, feed_alike(15), {'signal': 'µT'}, 30_000, config='{rate_hz: 250.0}'
+    ),
 }  # fmt: skip
 
 DEADLINE_S = 30.0
@@ -143,17 +136,10 @@ MAX_AT_ONCE_S = 0.04  # after a stall of the machine the line's buffer must not 
 class Rig:
     """A device, its driver, and the time that passes for the device; usable as a context manager."""
 
-    def __init__(
-        self,
-        name: str,
-        link: Path,
-        pace: float = 1.0,
-        case: RigCase | None = None,
-        device: EmulatedDevice | None = None,
-    ) -> None:
+    def __init__(self, name: str, link: Path, pace: float = 1.0, case: RigCase | None = None) -> None:
         self.case = case or CASES[name]
         self.link = link
-        self.device = device or DEVICES[name](link, np.random.default_rng(0))
+        self.device = self.case.device(link, np.random.default_rng(0))
         self.device.plug()
         self.start_ns = time.time_ns()
         self._name = name

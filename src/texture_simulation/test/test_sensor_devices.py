@@ -30,11 +30,10 @@ Make = Callable[..., Rig]
 def open_rig(tmp_path: Path) -> Iterator[Make]:
     with ExitStack() as rigs:
 
-        def open_rig(name: str, device: Any = None, sensor: Any = None, **changes: Any) -> Rig:
-            """Return a rig with an opened sensor: another device or driver than of the catalogue, a changed case."""
+        def open_rig(name: str, sensor: Any = None, **changes: Any) -> Rig:
+            """Return a rig with an opened sensor: another driver than of the catalogue, a changed case."""
             link = tmp_path / name
-            made = device and device(link, np.random.default_rng(0))
-            rig = rigs.enter_context(Rig(name, link, case=replace(CASES[name], **changes), device=made))
+            rig = rigs.enter_context(Rig(name, link, case=replace(CASES[name], **changes)))
             rig.sensor = sensor(link) if sensor else rig.sensor
             rig.sensor.open()
             return rig
@@ -48,9 +47,8 @@ def board(
     """Return a rig with a board of BioTacs."""
     return open_rig(
         'biotac',
-        partial(EmulatedBioTac, serials=serials),
         lambda link: BioTac(SensorParams(device=str(link), finger=finger), **options),
-        **vars(biotac(prefix, fingers=len(serials))),
+        **vars(biotac(partial(EmulatedBioTac, serials=serials), prefix, fingers=len(serials))),
     )
 
 

@@ -122,10 +122,16 @@ def test_a_finger_in_the_air_or_at_rest_senses_nothing_however_long(sensor: str,
     kind = SENSORS[sensor]
     count = kind.step_points * round(0.5 * kind.path_rate_hz / kind.step_points)
     travelled_m, rest_m = 0.1 * np.arange(count) / kind.path_rate_hz, np.zeros(count)
-    for x_m, force_n in ((travelled_m, 0.0), (rest_m, 2.0)):
+
+    def largest_change(x_m: np.ndarray, force_n: float) -> float:
         model = kind.make(scene, scene.surface('rough'), np.random.default_rng(0), settled=True)
         measured = model.streams(Trajectory(x_m, rest_m, np.full(count, force_n)), slow=False)[kind.fast.topic]
-        assert np.ptp(measured[len(measured) // 2 :], axis=0).max() <= 1e-3 * max(1.0, np.abs(measured).max())
+        return float(np.ptp(measured[len(measured) // 2 :], axis=0).max())
+
+    sliding = largest_change(travelled_m, 2.0)
+    assert sliding > 0.0
+    assert largest_change(travelled_m, 0.0) <= 1e-3 * sliding  # in the air
+    assert largest_change(rest_m, 2.0) <= 1e-3 * sliding
 
 
 SHARP = MIN_BLUR_M
