@@ -34,6 +34,7 @@ PRESETS = sorted((resources.folder('texture_bringup', 'config') / 'robots').glob
 ROOT = Path(__file__).parents[3]
 ARMS = {'ur5e': UrArmParams}
 ROBOTS = ('ur', 'rails', 'hand', 'ros_controllers')
+EMULATED_ROBOTS = ('ur_controller', 'rails', 'leap_hand', 'twist_controller')
 
 
 def values_of(text):
@@ -94,11 +95,14 @@ def test_a_real_robot_comes_without_anything_emulated(robot):
     assert {node.executable for node in real} == {'explorer', 'sensor', 'feature_extractor', 'classifier'}
 
 
+@pytest.mark.parametrize('emulated', ['true', 'false'])
 @pytest.mark.parametrize('robot', ROBOTS)
-def test_with_a_mapping_the_adaptor_takes_the_place_of_the_sensor(robot):
-    given = {'emulated': 'false', 'mapping': 'biotac_sensors', 'mapping_finger': '2'}
-    nodes = {node.executable: node for node in read(find_launch_file(robot), given, {})}
+def test_with_a_mapping_the_adaptor_takes_the_place_of_the_sensor_also_of_an_emulated_one(robot, emulated):
+    given = {'emulated': emulated, 'mapping': 'biotac_sensors', 'mapping_finger': '2'}
+    found = read(find_launch_file(robot), given, {})
+    nodes = {node.executable: node for node in found if node.executable not in EMULATED_ROBOTS}
     assert nodes.keys() == {'explorer', 'adaptor', 'feature_extractor', 'classifier'}
+    assert len(found) == len(nodes) + (emulated == 'true')
     assert given_to(nodes['adaptor']) == {'mapping': 'biotac_sensors', 'finger': 2}
 
 
