@@ -451,7 +451,8 @@ PAGES: Mapping[str, tuple[str, str, Callable[[Path], str]]] = {
     'launch': (
         'Launch files',
         'Each file is started by `texture launch NAME ARGUMENT:=VALUE` or by `ros2 launch texture_bringup '
-        'NAME.launch.xml ARGUMENT:=VALUE`. Files that start a robot pass on the arguments of `tactile`.',
+        'NAME.launch.xml ARGUMENT:=VALUE`. Files that start a robot pass on the arguments of `tactile`; '
+        'a launch file that includes one sets these before it, as by `<let name="surface" value="leather"/>`.',
         launch_files,
     ),
     'commands': (

@@ -14,6 +14,7 @@ from texture_bringup.launcher import find_launch_file, read
 from texture_core import config as resources
 from texture_core.config import parameters_of
 from texture_core.errors import InvalidLaunch
+from texture_drivers.sensor import BatchParams
 from texture_exploration.arms.arm import SurfacePoseParams
 from texture_exploration.arms.in_hand import InHandParams
 from texture_exploration.arms.rails import RailsParams
@@ -34,6 +35,7 @@ PRESETS = sorted((resources.folder('texture_bringup', 'config') / 'robots').glob
 ROOT = Path(__file__).parents[3]
 ARMS = {'ur5e': UrArmParams}
 ROBOTS = ('ur', 'rails', 'hand', 'ros_controllers')
+EMULATED_ROBOTS = ('ur_controller', 'rails', 'leap_hand', 'twist_controller')
 
 
 def values_of(text):
@@ -94,12 +96,32 @@ def test_a_real_robot_comes_without_anything_emulated(robot):
     assert {node.executable for node in real} == {'explorer', 'sensor', 'feature_extractor', 'classifier'}
 
 
+@pytest.mark.parametrize('emulated', ['true', 'false'])
 @pytest.mark.parametrize('robot', ROBOTS)
-def test_with_a_mapping_the_adaptor_takes_the_place_of_the_sensor(robot):
-    given = {'emulated': 'false', 'mapping': 'biotac_sensors', 'mapping_finger': '2'}
-    nodes = {node.executable: node for node in read(find_launch_file(robot), given, {})}
+def test_with_a_mapping_the_adaptor_takes_the_place_of_the_sensor_also_of_an_emulated_one(robot, emulated):
+    given = {'emulated': emulated, 'mapping': 'biotac_sensors', 'mapping_finger': '2'}
+    found = read(find_launch_file(robot), given, {})
+    nodes = {node.executable: node for node in found if node.executable not in EMULATED_ROBOTS}
     assert nodes.keys() == {'explorer', 'adaptor', 'feature_extractor', 'classifier'}
+    assert len(found) == len(nodes) + (emulated == 'true')
     assert given_to(nodes['adaptor']) == {'mapping': 'biotac_sensors', 'finger': 2}
+
+
+def test_a_finger_that_the_adaptor_refuses_is_refused_by_the_launch_with_its_argument():
+    finger = next(item for item in parameters_of(BatchParams) if item.name == 'finger')
+    given = {'mapping': 'biotac_sensors', 'mapping_finger': f'{finger.high:g}'}
+    read(find_launch_file('ros_controllers'), given, {})
+    with pytest.raises(InvalidLaunch, match=r"argument 'mapping_finger' is '16'; allowed is one of 0, 1, .*, 15$"):
+        read(find_launch_file('ros_controllers'), {**given, 'mapping_finger': f'{finger.high + 1:g}'}, {})
+
+
+def test_the_arguments_of_the_finger_of_an_included_robot_are_set_before_it(tmp_path):
+    [example] = re.findall(r'`(<let [^`]*/>)`', (ROOT / 'docs/reference/launch.md').read_text())
+    include = '<include file="$(find-pkg-share texture_bringup)/launch/ros_controllers.launch.xml"/>'
+    file = tmp_path / 'mine.launch.xml'
+    file.write_text(f'<launch>{example}{include}</launch>')
+    emulator = next(node for node in read(file, {}, os.environ) if node.executable == 'emulator')
+    assert given_to(emulator)['surface'] == 'leather'
 
 
 @pytest.mark.parametrize('robot', ROBOTS)

@@ -27,7 +27,9 @@ def graph() -> Iterator[LocalGraph]:
         yield graph
 
 
-def test_messages_become_signals_and_silence_and_malformed_values_are_reported(graph: LocalGraph, tmp_path) -> None:
+def test_messages_become_signals_and_silence_and_malformed_values_are_reported(
+    graph: LocalGraph, tmp_path, capfd
+) -> None:
     mapping = tmp_path / 'mine.yaml'
     mapping.write_text(
         'signals: {signal: {topic: tactile, type: std_msgs/msg/Float32MultiArray, values: [data], channels: [a, b], '
@@ -38,6 +40,9 @@ def test_messages_become_signals_and_silence_and_malformed_values_are_reported(g
     reports = graph.listen(DiagnosticArray, '/diagnostics')
     sender = graph.peer.create_publisher(Float32MultiArray, 'tactile', SENSOR_QOS)
     graph.until(lambda: any('start the driver' in report.status[0].message for report in reports))
+    assert capfd.readouterr().err == ''  # it may start after the node
+    graph.until(lambda: len(reports) > 5)
+    assert "no message on '/tactile' yet; start the driver, or correct the topic" in capfd.readouterr().err
     numbers = itertools.count()
 
     def heard() -> bool:
@@ -47,6 +52,7 @@ def test_messages_become_signals_and_silence_and_malformed_values_are_reported(g
     graph.until(heard)
     assert (signals[0].sensor, signals[0].header.frame_id, list(signals[0].units)) == ('mine', 'tip', ['N', 'N'])
     assert np.array(signals[0].samples)[1] == 0.5
+    assert capfd.readouterr().err.count('the sensor delivers samples') == 1
     reports.clear()
     sender.publish(Float32MultiArray(data=[1.0]))
     graph.until(lambda: any('1 numbers; 2 are needed' in report.status[0].message for report in reports))

@@ -235,6 +235,21 @@ def feed(watched: ChannelWatch, stream: Stream, seconds: int, **added: float) ->
     return faults
 
 
+def test_a_tare_that_is_ended_leaves_no_baseline_of_a_stream_that_was_not_done() -> None:
+    watched, stream = ChannelWatch(TareParams(tare_s=1.0), ['signal', 'slow'], {}), Stream()
+    watched.start_tare()
+    for batch in stream.seconds(1.5):
+        watched.add('signal', batch)
+    watched.end_tare('the finger moves')
+    for batch in stream.seconds(1.5):
+        watched.add('slow', batch)
+    assert {topic: baseline is not None for topic, baseline in watched.baselines.items()} == {
+        'signal': True,
+        'slow': False,
+    }
+    assert (watched.taring, watched.refusal) == (False, 'the finger moves')
+
+
 def test_an_unloaded_sensor_that_stays_where_it_was_tared_has_no_fault() -> None:
     watched, stream = unloaded(), Stream()
     assert feed(watched, stream, 60) == []

@@ -142,6 +142,18 @@ def test_the_rate_is_measured_to_a_third_of_a_percent_in_two_seconds(rate_hz: fl
     assert found_hz == pytest.approx(rate_hz, rel=0.003)
 
 
+@pytest.mark.parametrize(
+    ('period_ns', 'rate_hz'),
+    [(2_000_024, 500.0), (1_999_960, 500.0), (16_000_000, 62.5), (16_001_000, 62.5), (83_000_000, 12.0)],
+)
+def test_a_rate_measured_twice_is_the_same_and_within_half_a_percent(period_ns: int, rate_hz: float) -> None:
+    meter, found_hz, samples = RateMeter(), 0.0, 0
+    while not found_hz:
+        samples += 1
+        found_hz = meter.update(1, START + samples * period_ns)
+    assert found_hz == rate_hz
+
+
 MS = 1_000_000
 BATCH = 10
 CALM_S = 0.6  # after a loss, times are right again within

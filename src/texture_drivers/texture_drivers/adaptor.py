@@ -42,7 +42,11 @@ class SignalMapping:
     )
     gain: float = param(1.0, 'Factor by which the numbers are multiplied; it is signed.')
     rate_hz: float = param(
-        0.0, 'Samples of a channel in a second; 0 measures it in the first 2 s.', unit='Hz', low=0.0, high=1e6
+        0.0,
+        'Samples of a channel in a second; 0 measures it in the first 2 s, to a whole hertz. Set it for training.',
+        unit='Hz',
+        low=0.0,
+        high=1e6,
     )
     consecutive: bool = param(False, 'Reads the numbers of a message as consecutive samples, not as one.')
     encoding: str = param(

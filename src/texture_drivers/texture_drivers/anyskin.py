@@ -180,7 +180,7 @@ class AnySkinSettings:
     )  # fmt: skip
     rate_hz: float = param(
         0.0,
-        'Rate of the board; 0 measures it in the first two seconds, to a whole hertz. A model needs the rate '
+        'Rate of the board; 0 measures it in the first 2 s, to a whole hertz from 100 Hz on. A model needs the rate '
         'that it was trained at, so set it once it is known.',
         unit='Hz',
         low=0.0,
@@ -248,9 +248,8 @@ class AnySkin(SerialSensor):
             return {}
         blocks = [(run.missing, len(run.values)) for run in runs]
         if self._numbering is None:
-            rate_hz = self._meter.update(sum(map(sum, blocks)), arrival_ns)
-            if rate_hz:
-                self._rate_hz = float(max(1, round(rate_hz)))
+            self._rate_hz = self._meter.update(sum(map(sum, blocks)), arrival_ns)
+            if self._rate_hz:
                 self._numbering = self._make_numbering()
             return {}
         # A batch of each run; none while there are no indices.

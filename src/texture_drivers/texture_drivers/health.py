@@ -137,8 +137,8 @@ class StreamWatch:
         """Whether a tare is in progress."""
         return self._tare is not None
 
-    def start_tare(self, tare: Tare) -> None:
-        """Tare from the next batch on."""
+    def start_tare(self, tare: Tare | None) -> None:
+        """Tare from the next batch on; None ends what is in progress."""
         self._tare = tare
 
     def add(self, batch: TactileSignal) -> bool:
@@ -231,6 +231,14 @@ class ChannelWatch:
             self.refusal = ''
             for stream in self._streams.values():
                 stream.start_tare(Tare(self._params.tare_s))
+
+    def end_tare(self, why: str) -> None:
+        """Refuse the tare of every stream that is still in progress."""
+        with self._lock:
+            for stream in self._streams.values():
+                if stream.taring:
+                    self.refusal = why
+                    stream.start_tare(None)
 
     def add(self, topic: str, batch: TactileSignal) -> tuple[TactileSignal, Baseline | None]:
         """Take a batch; return what is to be published of it, and the baseline if it has just become known."""

@@ -437,6 +437,9 @@ class ArrivalNumbering:
 
 MEASURED_S = 2.0  # with arrivals seen each 10 ms, the error of a rate of 100 Hz is some 0.1 Hz
 LEAST_ARRIVALS = 20
+# Whole hertz from here on, below it three digits: each launch finds the same rate, off by less than the drift that a
+# clock follows (0.5 %).
+WHOLE_FROM_HZ = 100.0
 
 
 class RateMeter:
@@ -455,7 +458,7 @@ class RateMeter:
         self._arrivals: list[Arrival] = []  # samples so far, and when the last of them was there
 
     def update(self, samples: int, arrival_ns: int) -> float:
-        """Add samples that have just arrived; return the rate, Hz, or 0.0 while it is unknown."""
+        """Add samples that have just arrived; return the rate, Hz, rounded, or 0.0 while it is unknown."""
         self._samples += samples
         if not self._arrivals:
             self._start_ns = arrival_ns
@@ -463,7 +466,8 @@ class RateMeter:
         elapsed_ns = self._arrivals[-1].delay_ns
         if elapsed_ns < MEASURED_S * NANOSECONDS or len(self._arrivals) < LEAST_ARRIVALS:
             return 0.0
-        return NANOSECONDS / supporting_slope(self._arrivals)
+        rate_hz = NANOSECONDS / supporting_slope(self._arrivals)
+        return float(round(rate_hz)) if rate_hz >= WHOLE_FROM_HZ else float(f'{rate_hz:.3g}')
 
 
 # --------------------

@@ -55,7 +55,16 @@ def test_a_finger_is_checked_corrected_and_found_as_trained_again(trained):
     assert 'the gain changed by +6.' in sentence or 'the gain changed by +5.' in sentence
     assert sentence.endswith('correct the model by --correct')
 
-    check(model, louder(slides[2], 2.0), correct=True)
+    _, sentence = check(model, louder(slides[2], 2.0), correct=True)
+    assert 'start the nodes again with its model card as recipe' in sentence
+    as_trained, sentence = check(model, louder(slides[4], 2.0))
+    assert as_trained and sentence.startswith("with its correction, '") and 'as trained' in sentence
+    as_trained, sentence = check(model, louder(slides[4], 6.0))
+    assert not as_trained
+    assert 'also with its correction' in sentence and sentence.endswith('train with this finger')
+    as_trained, sentence = check(model, slides[4])
+    assert not as_trained
+    assert sentence.endswith('corrects another one; remove that by --correct')
     corrected = load_model(model)
     of_extractor = FeatureSet.load(f'{model}.json')  # what the node loads
     for feature_set in (corrected.recipe.feature_set, of_extractor):
@@ -68,6 +77,16 @@ def test_a_finger_is_checked_corrected_and_found_as_trained_again(trained):
     as_trained, sentence = check(model, slides[4], correct=True)  # the old finger is back
     assert as_trained and sentence.endswith('its correction is removed')
     assert load_model(model).feature_set == plain.feature_set
+
+
+def test_a_slide_with_lost_samples_is_refused_with_advice_for_an_operator(trained):
+    model, slides = trained
+    *before, last = slides[2].signals['signal']
+    after = replace(last, first_sample=last.first_sample + 100, samples=last.samples[100:])
+    assert before
+    signals = {'signal': [*before, after]}
+    with pytest.raises(InvalidData, match=r"samples of 'signal' were lost .*; stop other programs .* and check again"):
+        check_finger(model, TOPICS, {}, replace(slides[2], signals=signals))
 
 
 def test_the_reference_tells_how_its_slide_was_made(trained):

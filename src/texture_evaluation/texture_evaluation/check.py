@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -24,8 +25,10 @@ from texture_features.correction import (
     InputStatistics,
     compare,
     file_next_to,
+    read_correction,
     write_reference,
 )
+from texture_features.windows import WindowBatch
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.slides import LabelledSlide, SlideSamples
 
@@ -33,14 +36,24 @@ TOUCH_NS = 200_000_000  # the skin feels a touch before the arm does
 UNMEASURED = 'noise and drift were not measured, as too little was recorded before the touch'
 
 
-def statistics_of(slide: LabelledSlide, topics: Iterable[str]) -> dict[str, InputStatistics]:
-    """Return what a slide over the reference plate shows of each input."""
+def statistics_of(
+    slide: LabelledSlide, topics: Iterable[str], correction: Correction | None = None
+) -> dict[str, InputStatistics]:
+    """Return what a slide over the reference plate shows of each input, as the correction of a model leaves it."""
     found = {}
     for topic in topics:
-        samples = SlideSamples.of(slide, topic)
-        sensor = slide.signals[topic][0].sensor
-        rest = _at_rest(slide, topic)
-        found[topic] = InputStatistics.of(samples.samples, rest, samples.rate_hz, samples.channels, sensor)
+        batches = slide.signals.get(topic, ())
+        if any(after.first_sample != before.next_sample for before, after in pairwise(batches)):
+            raise InvalidData(
+                f"samples of '{topic}' were lost in the slide over the plate; stop other programs on the computer, and "
+                'check again'
+            )
+        one, rest = SlideSamples.of(slide, topic), _at_rest(slide, topic)
+        samples = one.samples
+        if correction is not None:
+            samples = correction.apply(topic, WindowBatch(samples, one.rate_hz)).samples
+            rest = correction.apply(topic, WindowBatch(rest, one.rate_hz)).samples if len(rest) else rest
+        found[topic] = InputStatistics.of(samples, rest, one.rate_hz, one.channels, batches[0].sensor)
     return found
 
 
@@ -85,26 +98,38 @@ def check_finger(
     *,
     correct: bool = False,
 ) -> tuple[bool, str]:
-    """Compare the finger with that of the training by a slide over the plate; return whether it is, and a sentence."""
+    """Compare the finger with that of the training by a slide over the plate; return whether it is, and a sentence.
+
+    It is compared as the nodes see it: through the correction of the model, if there is one.
+    """
     today = statistics_of(slide, topics)
     if missing := sorted(set(today) - set(reference)):
         raise InvalidData(f"the reference holds no '{missing[0]}'; store it again by --store")
     found = {topic: compare(reference[topic], one) for topic, one in today.items()}
     faults = _faults(found)
-    correction = file_next_to(model, CORRECTION)
+    path, correction = file_next_to(model, CORRECTION), read_correction(model)
+    # Without the option the nodes keep the correction, so what it leaves is what counts.
+    if correction is not None and not correct:
+        seen = statistics_of(slide, topics, correction)
+        left = {topic: compare(reference[topic], one) for topic, one in seen.items()}
+        if not _faults(left):
+            return True, f"with its correction, '{path}', {_claim(left)}"
+        if not faults:
+            return False, f"the finger is as trained, but '{path}' corrects another one; remove that by --correct"
+        return False, (
+            f"the finger is not as trained, also with its correction, '{path}': {'; '.join(_faults(left))}. Correct it "
+            'anew by --correct; if that does not help, train with this finger'
+        )
     if not faults:
         # A correction would falsify a finger that is as trained.
-        removed = correct and correction.exists()
-        if removed:
-            correction.unlink()
-        known = all(one.rest_is_known for one in found.values())
-        claim = 'the finger is as trained' if known else f'gain and response are as trained, {UNMEASURED}'
-        return True, f'{claim}: {_numbers(found)}{"; its correction is removed" if removed else ""}'
+        if correction is not None:
+            path.unlink()
+        return True, _claim(found) + ('; its correction is removed' if correction is not None else '')
     sentence = f'the finger is not as trained: {"; ".join(faults)}'
     if not correct:
         return False, f'{sentence}. Clean or replace the skin, or correct the model by --correct'
-    write_json(Correction.of(found).as_mapping(), correction)
-    return False, f"{sentence}. The model is corrected, '{correction}': start it with its model card as the recipe"
+    write_json(Correction.of(found).as_mapping(), path)
+    return False, f"{sentence}. The model is corrected, '{path}': start the nodes again with its model card as recipe"
 
 
 def adapt_to_today(model: str | Path, bags: Sequence[str | Path], today: Sequence[str | Path]) -> str:
@@ -132,10 +157,14 @@ def _numbers_shown(slide: LabelledSlide) -> dict[str, float]:
     return {'speed_m_s': speed_m_s, 'force_n': force_n, 'distance_m': distance_m, 'direction_rad': made.direction_rad}
 
 
-def _numbers(found: Mapping[str, InputComparison]) -> str:
-    return ', '.join(
+def _claim(found: Mapping[str, InputComparison]) -> str:
+    """Return that a finger is as trained, as far as it was measured, with the numbers."""
+    known = all(one.rest_is_known for one in found.values())
+    claim = 'the finger is as trained' if known else f'gain and response are as trained, {UNMEASURED}'
+    numbers = ', '.join(
         f'{topic} gain {np.median(one.gain_db):+.1f} dB, response within {np.abs(one.response_db).max():.1f} dB and '
         f'{one.uneven_db:.1f} dB rms ({RESPONSE_DB:g} dB rms is allowed)'
         + (f', noise × {one.noise_ratio:.1f}, drift {one.drift:.1f} rms' if one.rest_is_known else '')
         for topic, one in found.items()
     )
+    return f'{claim}: {numbers}'

@@ -97,6 +97,11 @@ class SafetyLimits:
                 raise InvalidParameter(
                     f"parameter '{axis}_low_m' is {low:g}; it must be below '{axis}_high_m', which is {high:g} m"
                 )
+        for name, (of_low, of_high, unit) in RANGES.items():
+            lowest, highest, _ = self.range(name)
+            if not lowest <= highest:
+                least = f"'{of_low}', which is {lowest:g}" if isinstance(of_low, str) else f'{lowest:g}'
+                raise InvalidParameter(f"parameter '{of_high}' is {highest:g}; it must be at least {least} {unit}")
         if self.force_limit_n <= self.max_force_n:
             raise InvalidParameter(
                 f"parameter 'force_limit_n' is {self.force_limit_n}; "
@@ -224,6 +229,17 @@ class SurfacePatch:
     patch_x_high_m: float = _edge(0.0, 'Highest x', PATCH)
     patch_y_low_m: float = _edge(0.0, 'Lowest y', PATCH)
     patch_y_high_m: float = _edge(0.0, 'Highest y', PATCH)
+
+    def __post_init__(self) -> None:
+        for axis, low, high in (
+            ('x', self.patch_x_low_m, self.patch_x_high_m),
+            ('y', self.patch_y_low_m, self.patch_y_high_m),
+        ):
+            if not low <= high:
+                raise InvalidParameter(
+                    f"parameter 'patch_{axis}_low_m' is {low:g}; it must not be above 'patch_{axis}_high_m', which is "
+                    f'{high:g} m'
+                )
 
     def start(self, request: ExplorationRequest, home: Vector, limits: SafetyLimits) -> Vector:
         """Return where an exploration begins: at `home`, or above its start at the same height."""

@@ -1,5 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -48,6 +49,16 @@ class Bench:
         for topic, batch in sorted(pairs, key=lambda pair: pair[1].stamp_ns):
             self.of_topics[topic].publish(to_msg(batch))
             self.graph.spin_once(0.02)
+
+
+def test_a_start_with_the_correction_of_a_finger_says_so(tmp_path, capfd):
+    (tmp_path / 'mine.json').write_text(json.dumps({'recipe': FeatureSet.load('default').as_mapping()}))
+    (tmp_path / 'mine.correction.json').write_text('{"signal": {"frequencies_hz": [1.0], "response_db": [[6.0]]}}')
+    with LocalGraph(69) as graph:
+        graph.add(FeatureExtractor, recipe='default')
+        assert 'corrected' not in capfd.readouterr().err
+        graph.add(FeatureExtractor, recipe=str(tmp_path / 'mine.json'))
+    assert f"the finger is corrected by '{tmp_path}/mine.correction.json'" in capfd.readouterr().err
 
 
 @pytest.fixture

@@ -450,7 +450,10 @@ def fingerprint_difference(came: str, trained: str) -> str:
     for topic, (rate, channels) in found.items():
         trained_rate, trained_channels = wanted[topic]
         if rate != trained_rate:
-            return f"the sampling rate of '{topic}' is {rate} Hz, the model was trained at {trained_rate} Hz"
+            return (
+                f"the sampling rate of '{topic}' is {rate} Hz, the model was trained at {trained_rate} Hz; where a "
+                "driver measures the rate, set 'rate_hz'"
+            )
         if channels != trained_channels:
             return f"'{topic}' has {channels} channels, the model was trained on {trained_channels}"
     if came.partition(CORRECTED)[0] == trained.partition(CORRECTED)[0]:
@@ -678,7 +681,8 @@ class LabelledFeatures:
         fingerprints = sorted({vector.feature_set for vector in used})
         if len(fingerprints) > 1:
             raise ModelMismatch(
-                f'the windows are described in different ways: {"; ".join(fingerprints)}; use those of one kind'
+                f'the windows are described in different ways: {"; ".join(fingerprints)}; use those of one kind, '
+                "and where a driver measures the rate, set 'rate_hz'"
             )
         running: defaultdict[str, RunningConditions] = defaultdict(RunningConditions)
         for vector in used:

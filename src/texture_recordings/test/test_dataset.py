@@ -124,6 +124,13 @@ def test_long_pauses_are_shortened() -> None:
     assert [schedule.due_s(NANOSECONDS * t) for t in (0, 60, 60)] == pytest.approx([0.0, 1.0, 1.0])
 
 
+def test_a_second_tare_is_no_restart_of_a_driver() -> None:
+    continuity = Continuity()
+    for stream in ('/signal_static_baseline',) * 2:
+        continuity.update(stream, TactileSignal(0, 's', ('c',), (), 1.0, 0, np.zeros((1, 1), dtype=np.float32)))
+    assert (continuity.losses, continuity.restarts.total()) == ('', 0)
+
+
 def test_losses_and_restarts_of_each_stream_are_counted() -> None:
     continuity = Continuity()
     for stream, first in (('a', 100), ('b', 0), ('a', 104), ('a', 110), ('a', 0), ('b', 4)):

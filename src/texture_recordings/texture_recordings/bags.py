@@ -613,6 +613,8 @@ class Continuity:
 
     def update(self, stream: str, signal: TactileSignal) -> None:
         """Take the next batch of a stream; an index that goes back is a restart of its driver, not a loss."""
+        if stream.endswith('_baseline'):  # the level of a tare, which has no index
+            return
         jump = signal.first_sample - self._next.get(stream, signal.first_sample)
         self.samples[stream] += len(signal.samples)
         self.lost[stream] += max(0, jump)

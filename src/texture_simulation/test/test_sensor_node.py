@@ -117,6 +117,39 @@ def test_a_tare_without_a_sensor_is_refused(graph: LocalGraph, tmp_path: Path) -
     assert response.message == 'the sensor delivers no samples; see its message on /diagnostics'
 
 
+@pytest.mark.parametrize('phase', [Phase.APPROACH, Phase.CONTACT, Phase.SLIDE, Phase.LIFT, Phase.ABORTED])
+def test_a_finger_that_may_touch_something_is_not_tared_until_it_is_lifted(
+    graph: LocalGraph, tmp_path: Path, phase: Phase
+) -> None:
+    def feed(device: Any, first: int, ticks: int) -> None:
+        device.measure({'signal': np.full((ticks, 15, 1), 0.25)})
+
+    case = replace(CASES['anyskin'], feed=feed)
+    answers: list[Trigger.Response] = []
+    signal = graph.listen(msg.TactileSignal, 'signal', SENSOR_QOS)
+    baselines = graph.listen(msg.TactileSignal, 'signal_baseline', STATE_QOS)
+    states = graph.peer.create_publisher(msg.ExplorationState, 'exploration', STATE_QOS)
+
+    def is_tared() -> bool:
+        answers.append(node._on_tare(Trigger.Request(), Trigger.Response()))
+        return bool(answers[-1].success)
+
+    with Rig('anyskin', tmp_path / 'anyskin', case=case) as rig:
+        node = graph.add(SensorNode, sensor='anyskin', device=str(rig.link), config=case.config, tare_s=0.2)
+        graph.until(lambda: states.get_subscription_count() and signal)
+        states.publish(to_msg(ExplorationState(1, 'a', 'linear_slide', phase)))
+        graph.until(lambda: not is_tared())
+        assert answers[-1].message.startswith('nothing is tared: the finger may touch something')
+        assert f"the phase '{phase.value}'" in answers[-1].message
+        states.publish(to_msg(ExplorationState(2, '', '', Phase.IDLE)))
+        graph.until(lambda: not is_tared())
+        baselines.clear()
+        assert not is_tared()
+        assert not baselines
+        states.publish(to_msg(ExplorationState(3, 'a', 'linear_slide', Phase.ABORTED, lifted=True)))
+        graph.until(is_tared)
+
+
 # One of each kind of topics: of a single finger, of several, and in addition to the signal.
 @pytest.mark.parametrize('name', ['tsf85', 'biotac_hand', 'pvdf', 'anyskin', 'tsf85_pair'])
 def test_a_life_from_configuring_to_cleaning_up(graph: LocalGraph, tmp_path: Path, name: str) -> None:

@@ -20,6 +20,8 @@ from texture_drivers.adaptor import SignalAdaptor, load_mapping, losses
 from texture_drivers.health import BEFORE_THE_START
 from texture_drivers.sensor import BatchParams
 
+QUIET_REPORTS = 5  # on an error, one each second, before it is logged: the driver may start after the node
+
 
 def import_message(message_type: str) -> Any:
     """Return the class of 'package/msg/Type', found at run time: the suite does not depend on other drivers."""
@@ -57,8 +59,9 @@ class Adaptor(Node):
         self._publishers_of = {
             name: self.create_publisher(msg.TactileSignal, name, SENSOR_QOS) for name in self._adaptors
         }
-        self._received = self._lost = 0
+        self._received = self._lost = self._errors = 0
         self._fault = ''
+        self._delivers = False
         for adaptor in self._adaptors.values():
             wanted = adaptor.mapping
             self._listen(wanted.topic, wanted.type, adaptor.take)
@@ -83,6 +86,9 @@ class Adaptor(Node):
         for name, adaptor in self._adaptors.items():
             for batch in adaptor.batches():
                 self._publishers_of[name].publish(to_msg(batch))
+                if not self._delivers:
+                    self._delivers = True
+                    self.get_logger().info('the sensor delivers samples')
 
     def _report(self) -> DiagnosticReport:
         adaptors = list(self._adaptors.values())
@@ -90,14 +96,23 @@ class Adaptor(Node):
         self._received, self._fault = 0, ''
         lost = sum(adaptor.lost for adaptor in adaptors)
         new, self._lost = lost - self._lost, lost
-        topics = ', '.join(sorted({adaptor.mapping.topic for adaptor in adaptors}))
+        topics = ', '.join(sorted({f"'{self.resolve_topic_name(one.mapping.topic)}'" for one in adaptors}))
+        yet = '' if any(one.samples or one.refused for one in adaptors) else ' yet'
         conditions = (
             (bool(fault), 'ERROR', fault),
-            (received == 0, 'ERROR', f'no message on {topics}; start the driver, or correct the topic in the mapping'),
+            (
+                received == 0,
+                'ERROR',
+                f'no message on {topics}{yet}; start the driver, or correct the topic in the mapping',
+            ),
             (new > 0, 'WARN', f'{new} samples lost since the last report'),
             (not any(adaptor.samples for adaptor in adaptors), 'WARN', 'measuring rates and times'),
         )
         level, sentence = next(((level, text) for holds, level, text in conditions if holds), ('OK', 'converting'))
+        self._errors = self._errors + 1 if level == 'ERROR' else 0
+        if self._errors == QUIET_REPORTS:
+            self._delivers = False
+            self.get_logger().warning(sentence)
         values = {
             'samples': sum(adaptor.samples for adaptor in adaptors),
             'lost': lost,

@@ -30,7 +30,7 @@ from texture_core.ros import (
     to_msg,
     to_stamp,
 )
-from texture_core.types import NANOSECONDS, Sensor, TactileSignal
+from texture_core.types import NANOSECONDS, Phase, Sensor, TactileSignal
 from texture_drivers.catalogue import SENSORS
 from texture_drivers.health import ChannelWatch, SensorHealth, TareParams
 from texture_drivers.sensor import SensorParams, SensorReader
@@ -67,6 +67,7 @@ class SensorNode(PatientLifecycleNode):
         self._topics: dict[str, Any] = {}
         self._baselines: dict[str, Any] = {}
         self._imus: dict[str, Any] = {}
+        self._busy = ''  # why nothing can be tared now
         self.create_service(Trigger, '~/tare', self._on_tare, callback_group=ReentrantCallbackGroup())
         self.create_subscription(msg.ExplorationState, 'exploration', self._on_exploration, STATE_QOS)
         self._diagnostics = Diagnostics(self, self._report, hardware_id=params.device)
@@ -164,6 +165,9 @@ class SensorNode(PatientLifecycleNode):
             cause = 'the sensor delivers no samples; see its message on /diagnostics'
             response.message = cause if reader else 'the sensor node is not active; activate it'
             return response
+        if self._busy:
+            response.message = f'nothing is tared: {self._busy}'
+            return response
         before = watch.baselines
         watch.start_tare()
         end_s = time.monotonic() + self._tare_s + TARE_LATE_S
@@ -171,16 +175,26 @@ class SensorNode(PatientLifecycleNode):
             time.sleep(TARE_POLL_S)
         missing = [topic for topic, baseline in watch.baselines.items() if baseline is before[topic]]
         response.success = not missing
-        response.message = (
-            watch.refusal or f'{" and ".join(missing)} not tared: too few samples came, or the finger touched something'
-            if missing
-            else f'{", ".join(before)} tared'
-        )
+        tared = ', '.join(topic for topic in before if topic not in missing)
+        response.message = f'{tared} tared' if tared else 'nothing is tared'
+        if missing:
+            cause = watch.refusal or 'too few samples came, or the finger touched something'
+            response.message += f'; {" and ".join(missing)} not: {cause}'
         return response
 
     def _on_exploration(self, state: msg.ExplorationState) -> None:
+        phase = next((one for one in Phase if one.code == state.phase), None)
+        if state.lifted or phase is Phase.DONE:
+            self._busy = ''
+        elif phase is not Phase.IDLE:  # an idle finger is where the exploration before left it
+            self._busy = (
+                f"the finger may touch something, after the phase '{phase.value if phase else state.phase}' of an "
+                'exploration; tare when it has ended, or lift the finger first'
+            )
         if self._reader is not None:
             self._watch.unloaded = state.phase in UNLOADED
+            if self._busy:
+                self._watch.end_tare(self._busy)
 
     def _report(self) -> tuple[str, str, dict[str, Any]]:
         if self._reader is None:

@@ -26,6 +26,7 @@ from texture_core.ros import (
     run,
     to_msg,
 )
+from texture_features.correction import CORRECTION, file_next_to
 from texture_features.feature_set import FeatureSet
 from texture_features.windows import WindowCutter, WindowEvent
 
@@ -47,7 +48,10 @@ class FeatureExtractor(Node):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('feature_extractor', **kwargs)
-        self._feature_set = FeatureSet.load(declare(self, ExtractorParams).recipe)
+        recipe = declare(self, ExtractorParams).recipe
+        self._feature_set = FeatureSet.load(recipe)
+        if self._feature_set.correction is not None:
+            self.get_logger().info(f"the finger is corrected by '{file_next_to(recipe, CORRECTION)}'")
         self._cutter = WindowCutter(self._feature_set.windows, self._feature_set.window_names)
         self._invalid = self._sent = 0
         self._reported: dict[str, int] = {}
