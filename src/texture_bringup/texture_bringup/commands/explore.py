@@ -271,7 +271,13 @@ def _identify(options: argparse.Namespace) -> int:
             likely = np.argsort(-belief, kind='stable')[:SHOWN]
             print(f'  {", ".join(f"{known.textures[k]} {np.exp(belief[k]):.2f}" for k in likely)}')
     best = int(belief.argmax())
-    print(f'texture: {known.textures[best]}, probability {np.exp(belief[best]):.2f} after {number} slides')
+    found = f'{known.textures[best]}, probability {np.exp(belief[best]):.2f} after {number} slides'
+    decided = np.exp(belief[best]) >= options.sure
+    print(
+        f'texture: {found}'
+        if decided
+        else f'texture: undecided, --sure {options.sure:g} is not reached (nearest: {found})'
+    )
     return 0
 
 
