@@ -137,7 +137,7 @@ def test_what_cannot_be_trained_is_refused_with_a_sentence(model, silk, measured
     with pytest.raises(InvalidData, match='no label'):
         classifier.add('  ')
     classifier.begin('stopped-early')
-    with pytest.raises(InvalidData, match="'stopped-early' has no usable window: it ended before its slide .*: e1$"):
+    with pytest.raises(InvalidData, match=r"'stopped-early' has no usable window: it ended before its slide .*: e1$"):
         classifier.add('silk')
 
 

@@ -328,13 +328,16 @@ def collect_surface(
                 except (MotionRefused, MotionAborted) as error:
                     return error.error, str(error)
                 if explored.success:
+                    lost = recording.wait_for(explored.exploration_id)
                     made += 1
-                    if (lost := recording.wait_for(explored.exploration_id)) != losses:
+                    if lost != losses:
                         losses = lost
                         _print_progress(losses, made)
                 return explored.error, explored.message
 
             end = collection.collect(plan, params, explore, partial(_evaluate_bag, bag, surface), _print_progress)
+            if recording.end and end.error is not CollectionError.NOT_RECORDED:  # in the last evaluation, say
+                end = replace(end, error=CollectionError.NOT_RECORDED, message=f'{recording.end}; {end.message}')
     except LaunchFailed:  # the recorder was not discovered
         _remove(bag)
         raise
@@ -382,13 +385,15 @@ def unfinished_bags() -> Iterator[None]:
 class RecorderProcess(Child):
     """Record a bag in a separate process, which reports in its log what is on the disk."""
 
+    called = 'the recorder'
+
     def __init__(self, bag: Path, namespace: str, log: Path) -> None:
         super().__init__(['record', str(bag), '--namespace', namespace], os.environ, log)
 
     def check(self) -> None:
-        """Raise InvalidData, with its last message, if it has ended."""
+        """Raise InvalidData if it has ended."""
         if self.end:
-            raise InvalidData(f'the recorder ended: {self.end}')
+            raise InvalidData(self.end)
 
     def wait_for(self, exploration_id: str) -> str:
         """Return what was lost so far, '' if nothing, once an exploration is on the disk; InvalidData if it is not."""
