@@ -146,7 +146,10 @@ def test_a_failing_node_and_a_silent_one_are_red() -> None:
         'sensor': 'red',
         'explorer': 'green',
     }
-    assert {light['colour'] for light in node_statuses.shown(SILENT_S + 1)} == {'red'}
+    silent = {light['name']: light for light in node_statuses.shown(SILENT_S + 1)}
+    assert {light['colour'] for light in silent.values()} == {'red'}
+    assert silent['explorer']['message'].startswith('silent for 6 s; its last message: the arm answers; the arm may')
+    assert 'the arm may continue to press' not in silent['sensor']['message']
     for number in range(200):
         node_statuses.update(f'node{number}', 'OK', 'x' * 10_000, 2.0)
     assert len(node_statuses.shown(2.0)) == MAX_LIGHTS

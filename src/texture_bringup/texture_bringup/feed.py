@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from texture_bringup.launcher import PRESSES
 from texture_core.types import (
     ENDED,
     ExplorationState,
@@ -62,6 +63,7 @@ class NodeStatuses:
                 colour, text = ENDED_COLOURS.get(level, 'red'), f'ended: {message}'
             elif time_s - reported_s > SILENT_S:
                 colour, text = 'red', f'silent for {time_s - reported_s:.0f} s; its last message: {message}'
+                text += f'; {PRESSES}' * (name == 'explorer')
             found.append({'name': name, 'colour': colour, 'message': text})
         return found
 

@@ -245,6 +245,10 @@ def ending(returncode: int) -> str:
     return f'was killed by {names.get(-returncode, f"signal {-returncode}")}'
 
 
+# An explorer that was killed or failed lifts no finger.
+PRESSES = 'the arm may continue to press: raise the finger by freedrive or pendant before you launch again'
+
+
 # --------------------
 # Run the nodes of a launch file: show their output, restart those that may be restarted, leave no process behind.
 
@@ -345,12 +349,14 @@ class Supervisor:
         needed = node.needed or node.respawn or (self._together and code != 0)
         if code != 0 and not (stopping or restart):
             self._code = MISTAKE if code == MISTAKE and needed else 1
-        self._say(f'[launch] {node.label} {ending(code)}')
+        pressing = f'; {PRESSES}' * (node.executable == 'explorer' and code not in (0, MISTAKE))
+        self._say(f'[launch] {node.label} {ending(code)}{pressing}')
         if restart:
             self._due.append((time.monotonic() + node.respawn_delay_s, node, process.deaths + 1))
         elif needed and not stopping:
             self._say(f'[launch] {node.label} is required by the other nodes, which are stopped now')
-            self._cause = f'{node.label} {ending(code)}{f": {process.fault}" * bool(code and process.fault)}'
+            fault = f': {process.fault}' * bool(code and process.fault)
+            self._cause = f'{node.label} {ending(code)}{fault}{pressing}'
             self.stop()
 
 
