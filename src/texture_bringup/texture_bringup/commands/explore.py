@@ -418,7 +418,7 @@ def recorder(operator: Operator, bag: Path, namespace: str) -> Iterator[Recorder
         operator.wait_until(
             lambda: records(bag, recording.check),
             RECORDER_S,
-            f'the recorder that starts has no {" and ".join(RECORDED)}',
+            f'the recorder has received no {" and ".join(RECORDED)} yet; look at the output of sensor and explorer',
         )
         yield recording
 
@@ -443,7 +443,10 @@ def _configure_collect(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('surface', help='label of the surface under the finger')
     parser.add_argument('folder', type=Path, help='folder of the bags of all surfaces; made if missing')
     shape: dict[str, Any] = {'type': float, 'nargs': 2, 'default': (0.0, 0.0), 'metavar': ('LOW', 'HIGH')}
-    speed, force = 'speeds of the slides, m/s (default: 0.02 to 0.05)', 'normal forces, N (default: 1 to 2)'
+    speed, force = (
+        'lowest and highest speed, m/s (default: 0.02 0.05)',
+        'lowest and highest normal force, N (default: 1 2)',
+    )
     parser.add_argument('--speed', help=f'{speed}, as far as the explorer allows', **shape)
     parser.add_argument('--force', help=f'{force}, or the lowest that the explorer allows to twice that', **shape)
     add_parameters(parser, CollectionParams, without=SHORTER)
