@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from texture_msgs import msg
 
-from texture_core.ros import FEATURE_QOS, to_msg
+from texture_core.ros import FEATURE_QOS, STATE_QOS, to_msg
 from texture_core.ros_testing import LocalGraph
-from texture_core.types import FeatureVector
+from texture_core.types import ExplorationState, FeatureVector, Phase
 from texture_estimation.nodes.classifier import Classifier
 from texture_estimation.recipe import load_recipe
 from texture_estimation.training import train
@@ -71,6 +71,18 @@ def test_a_texture_is_added_and_removed_from_the_command_line(graph, asked, caps
     assert asked(graph, 'add', 'oak') == 0
     assert asked(graph, 'add', '--undo') == 0
     assert classify_slide(graph, 'slide-4') != 'oak'
+
+
+@pytest.mark.usefixtures('classifier')
+def test_the_slide_before_an_exploration_that_never_slid_is_not_added_in_its_place(graph, asked, capsys):
+    classify_slide(graph, 'slide-1')
+    publisher = graph.peer.create_publisher(msg.ExplorationState, 'exploration', STATE_QOS)
+    publisher.publish(to_msg(ExplorationState(1, 'stopped-2', 'linear_slide', Phase.APPROACH)))
+    graph.until(publisher.get_subscription_count)
+    assert publisher.wait_for_all_acked()
+    assert asked(graph, 'add', 'silk') == 2
+    assert "'stopped-2' has no usable window: it ended before its slide" in capsys.readouterr().err
+    assert asked(graph, 'add', 'silk', 'slide-1') == 0
 
 
 def test_parameters_of_a_running_node_are_set_from_the_command_line(graph, classifier, asked, capsys):

@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a collection asks of the explorer, and which bag it leaves, without a robot."""
 
+import os
+import signal
+import time
 from contextlib import contextmanager
 from pathlib import Path
 from unittest.mock import MagicMock, Mock
@@ -50,10 +53,10 @@ class Explorer:
 def collected(monkeypatch, tmp_path):
     """Collect with an explorer, by a recorder that makes a bag, and may not start, end or lose samples."""
 
-    def collected(explorer, recorder_ends=False, start=None, losses='', **params):
-        recording = Mock()
-        recording.check.side_effect = InvalidData('the recorder ended: no space') if recorder_ends else None
-        recording.wait_for.return_value = losses
+    def collected(explorer, recorder_ends=False, start=None, losses='', ends_late='', **params):
+        recording = Mock(end=ends_late)
+        recording.check.side_effect = InvalidData('the recorder died with exit code 1') if recorder_ends else None
+        recording.wait_for.side_effect = losses if isinstance(losses, list) else lambda _name: losses
 
         @contextmanager
         def recorder(_operator, bag, _namespace):
@@ -130,6 +133,48 @@ def test_lost_samples_are_reported_once_and_at_the_end(collected, tmp_path, monk
     assert (end.error, end.slides, bag) == (CollectionError.NONE, 2, tmp_path / 'cork')
     assert end.message.endswith('; 2970 samples lost')
     assert capsys.readouterr().out.splitlines()[0] == '1 slide: 2970 samples lost'
+
+
+KILLED = 'the recorder was killed by SIGKILL'
+
+
+def test_a_slide_that_the_recorder_has_not_written_does_not_count(collected, tmp_path):
+    end, bag = collected(Explorer(DONE, DONE), losses=['', InvalidData(KILLED)])
+    assert (end.error, end.message, end.slides) == (CollectionError.NOT_RECORDED, KILLED, 1)
+    assert bag == tmp_path / 'cork'
+
+
+def test_a_recorder_that_ends_in_the_last_evaluation_is_reported(collected, monkeypatch):
+    monkeypatch.setattr(explore, '_evaluate_bag', lambda *_: PlaceAccuracy(2, 0))
+    end, _ = collected(Explorer(DONE, DONE), ends_late=KILLED, places=2)
+    assert (end.error, end.slides) == (CollectionError.NOT_RECORDED, 2)
+    assert end.message.startswith(f'{KILLED}; 2 places')
+
+
+@pytest.mark.parametrize(
+    ('last', 'cause'),
+    [
+        ('[INFO] [1.0] [record]: 9 messages recorded', ''),
+        ('[ERROR] [1.0] [record]: no space', ': [ERROR] [1.0] [record]: no space'),
+    ],
+)
+def test_a_recorder_that_was_killed_says_so_and_names_no_line_of_its_work_as_the_cause(tmp_path, last, cause):
+    before = children()
+    with explore.RecorderProcess(tmp_path / 'bag', '', tmp_path / 'log') as recording:
+        [started] = children() - before
+        os.kill(started, signal.SIGKILL)
+        deadline_s = time.monotonic() + 10.0
+        while not recording.end:
+            assert time.monotonic() < deadline_s
+        recording.log.write_text(f'{last}\n')
+        with pytest.raises(InvalidData) as ended:
+            recording.check()
+    assert str(ended.value) == KILLED + cause
+
+
+def children():
+    """Return the processes that this thread has started."""
+    return set(map(int, Path('/proc/thread-self/children').read_text().split()))
 
 
 def test_a_slide_counts_when_the_recorder_has_it_on_the_disk(tmp_path, monkeypatch):

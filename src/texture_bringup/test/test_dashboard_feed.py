@@ -14,6 +14,7 @@ from texture_bringup.feed import (
     NodeStatuses,
     Ring,
     spectrum_db,
+    texture_text,
 )
 from texture_core.types import (
     ExplorationState,
@@ -70,9 +71,45 @@ def test_before_an_estimate_the_page_shows_why_there_is_none(reports, expected) 
     for name, level, message in reports:
         feed.node_statuses.update(name, level, message, 0.0)
     feed.on_state(sliding('a'))
-    assert feed.frame(1.0)['texture']['missing'] == expected
+    assert feed.frame(0.5)['texture']['missing'] == ('no estimate yet' if not reports else expected)
+    assert feed.frame(1.0 + SILENT_S)['texture']['missing'] == expected
     feed.on_texture(TextureEstimate(2, 'a', 'felt', Rejection.NONE, 0.9))
     assert feed.frame(1.0)['texture']['missing'] == ''
+
+
+@pytest.mark.parametrize(
+    ('rejection', 'listed'),
+    [
+        (Rejection.NONE, 'glass'),
+        (Rejection.NOVEL, 'glass?, rejected: novel'),
+        (Rejection.AMBIGUOUS, 'glass?, rejected: ambiguous'),
+    ],
+)
+def test_a_past_exploration_is_listed_with_its_rejection(rejection, listed) -> None:
+    feed = Feed()
+    feed.on_state(sliding('a'))
+    feed.on_texture(TextureEstimate(2, 'a', 'glass', rejection, 0.9))
+    assert feed.frame(0.0)['past'][0]['label'] == listed
+
+
+ELSEWHERE = 'trained at one place of each surface: elsewhere it may be rejected'
+
+
+@pytest.mark.parametrize(
+    ('label', 'rejection', 'reason'),
+    [
+        (
+            'glass',
+            Rejection.NOVEL,
+            'unknown (nearest: glass, confidence 0.91 after 1.5 s): it resembles no trained texture',
+        ),
+        ('', Rejection.AMBIGUOUS, 'unknown (nearest: several, confidence 0.91 after 1.5 s): ambiguous'),
+    ],
+)
+def test_the_reason_of_a_rejection_is_shown_before_what_the_model_notes(label, rejection, reason) -> None:
+    estimate = TextureEstimate(2, 'a', label, rejection, 0.91, windows=4, evidence_s=1.5, message=ELSEWHERE)
+    assert texture_text(estimate) == f'{reason}; {ELSEWHERE}'
+    assert texture_text(TextureEstimate(2, 'a', message='no model is loaded')) == 'no model is loaded'
 
 
 def test_a_frame_shows_what_came_and_stays_small() -> None:
@@ -109,7 +146,10 @@ def test_a_failing_node_and_a_silent_one_are_red() -> None:
         'sensor': 'red',
         'explorer': 'green',
     }
-    assert {light['colour'] for light in node_statuses.shown(SILENT_S + 1)} == {'red'}
+    silent = {light['name']: light for light in node_statuses.shown(SILENT_S + 1)}
+    assert {light['colour'] for light in silent.values()} == {'red'}
+    assert silent['explorer']['message'].startswith('silent for 6 s; its last message: the arm answers; the arm may')
+    assert 'the arm may continue to press' not in silent['sensor']['message']
     for number in range(200):
         node_statuses.update(f'node{number}', 'OK', 'x' * 10_000, 2.0)
     assert len(node_statuses.shown(2.0)) == MAX_LIGHTS

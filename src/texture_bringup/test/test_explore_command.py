@@ -99,13 +99,15 @@ def test_identify_makes_the_slide_that_distinguishes_textures_until_one_is_decid
     assert said.startswith('slide 1: linear_slide, direction 0°, 0.1 m/s, 2 N, 0.5 s; ')
     assert 'texture: ridges_x, probability ' in said
     assert {call.args[0].direction_rad for call in slide.call_args_list} == {0.0}
+    assert main(['identify', 'm', '--sure', '1', '--most', '1']) == 0
+    assert 'texture: undecided, --sure 1 is not reached (nearest: ridges_x, probability ' in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
     ('rejection', 'message', 'reason'),
     [
         (Rejection.NONE, '', None),
-        (Rejection.NOVEL, OUTSIDE, OUTSIDE),
+        (Rejection.OUTSIDE_TRAINING, OUTSIDE, OUTSIDE),  # begins with the reason itself
         (Rejection.NOVEL, '', 'it resembles no trained texture'),
         (Rejection.AMBIGUOUS, '', 'ambiguous'),
         (Rejection.TOO_LITTLE_TRAINING, '', 'too little training'),

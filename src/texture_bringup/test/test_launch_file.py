@@ -53,7 +53,7 @@ def test_while_the_files_of_a_launch_are_checked_it_says_so(tmp_path: Path, monk
     replay = NodeDescription('texture_recordings', 'replay', parameters=({'bag': str(tmp_path)},))
     with pytest.raises(InvalidData, match='is not a bag'):
         refuse_wrong([replay], {str(tmp_path)})
-    assert capsys.readouterr().err.startswith('check the files that the launch names, ')
+    assert capsys.readouterr().err.startswith('checking the files that the launch names, ')
 
 
 def test_an_emulator_in_a_users_launch_file_may_leave_its_pipe_as_it_is() -> None:

@@ -166,6 +166,13 @@ def test_the_death_of_a_needed_node_stops_the_others_and_is_named_last(
     assert launched.lines[-1] == f'[launch] the launch ended because bad {cause}'
 
 
+@pytest.mark.parametrize(('end', 'presses'), [('kill -9 $$', True), ('exit 1', True), ('exit 2', False)])
+def test_the_end_of_a_killed_explorer_says_that_the_arm_may_continue_to_press(launch, end, presses) -> None:
+    launched = launch({'good': GOOD, 'explorer': end}, explorer='on_exit="shutdown"')
+    assert launched.end() in (1, 2)
+    assert ('; the arm may continue to press: raise the finger' in launched.lines[-1]) == presses
+
+
 def test_a_node_that_may_be_restarted_comes_back(launch) -> None:
     launched = launch({'phoenix': GOOD}, phoenix='respawn="true"')
     first = launched.ready()

@@ -1,8 +1,9 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
+import signal
 import threading
 import time
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
 from functools import partial
 
 import pytest
@@ -12,12 +13,14 @@ from rclpy.context import Context
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
 from std_srvs.srv import Trigger
-from texture_msgs import action
+from texture_msgs import action, msg
 
 from texture_bringup import operator as operators
+from texture_bringup.feed import Feed
 from texture_core.errors import LaunchFailed, MotionAborted, MotionRefused
+from texture_core.ros import STATE_QOS, to_msg
 from texture_core.ros_testing import LocalGraph
-from texture_core.types import ExplorationRequest
+from texture_core.types import ExplorationRequest, ExplorationState, Phase
 
 # An explorer that answers at the end finds nobody there any more.
 pytestmark = [pytest.mark.realtime, pytest.mark.ros, pytest.mark.filterwarnings('ignore:failed to send response')]
@@ -164,3 +167,51 @@ def test_a_stop_that_is_not_answered_says_within_seconds_to_use_the_emergency_st
             operator.stop()
         assert time.monotonic() - begin_s < 8.0
         begin.set()
+
+
+def test_who_watches_sees_no_state_that_was_sent_long_before(monkeypatch):
+    monkeypatch.setattr(operators, 'HISTORY_NS', 0)
+    feed = Feed()
+
+    def seen():
+        return [past['id'] for past in feed.frame(0.0)['past']]
+
+    with LocalGraph(DOMAIN) as graph, operators.Operator(domain_id=DOMAIN) as operator:
+        publisher = graph.peer.create_publisher(msg.ExplorationState, 'exploration', STATE_QOS)
+
+        def publish(name):
+            publisher.publish(to_msg(ExplorationState(1, name, 'linear_slide', Phase.SLIDE)))
+
+        def show():
+            if publisher.get_subscription_count():
+                publish('new')
+            if 'new' in seen():
+                raise KeyboardInterrupt
+
+        publish('old')
+        with pytest.raises(KeyboardInterrupt):
+            operator.watch(feed, show)
+    assert seen() == ['new']
+
+
+def test_ctrl_c_ends_the_program_behind_what_rclpy_does_and_not_within():
+    done = []
+    with pytest.raises(KeyboardInterrupt), operators.uninterrupted():
+        signal.raise_signal(signal.SIGINT)
+        done.append('taken')
+    assert done == ['taken']
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_what_to_do_is_said_when_the_time_is_over_and_not_while_it_runs(monkeypatch):
+    said = []
+    monkeypatch.setattr(operators, 'task', lambda what, **_: said.append(what) or nullcontext())
+    monkeypatch.setattr(operators, 'ACCEPT_S', 0.2)
+    begin = threading.Event()
+    with silent_explorer(begin=begin), operators.Operator(domain_id=DOMAIN) as operator:
+        operator.wait_for_explorer(30.0)
+        with pytest.raises(MotionAborted, match=r'is not ready yet, .*; stop it, and check that no second one runs'):
+            operator.explore(ExplorationRequest('linear_slide'))
+        begin.set()
+    assert said[0] == "waiting for an explorer in the namespace '/', which may be starting"
+    assert said[-1] == 'waiting: the explorer is not ready yet, it may be connecting to the arm'

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from texture_bringup.launcher import PRESSES
 from texture_core.types import (
     ENDED,
     ExplorationState,
@@ -62,6 +63,7 @@ class NodeStatuses:
                 colour, text = ENDED_COLOURS.get(level, 'red'), f'ended: {message}'
             elif time_s - reported_s > SILENT_S:
                 colour, text = 'red', f'silent for {time_s - reported_s:.0f} s; its last message: {message}'
+                text += f'; {PRESSES}' * (name == 'explorer')
             found.append({'name': name, 'colour': colour, 'message': text})
         return found
 
@@ -183,7 +185,7 @@ def places_of(channels: tuple[str, ...]) -> list[tuple[int, int]]:
 # --------------------
 # Estimates as texts for people.
 
-UNLIKE = 'it resembles no trained texture'
+REASONS = {Rejection.NOVEL: 'it resembles no trained texture', Rejection.OUTSIDE_TRAINING: 'outside the training'}
 
 
 def in_words(value: IntEnum) -> str:
@@ -191,15 +193,23 @@ def in_words(value: IntEnum) -> str:
     return value.name.lower().replace('_', ' ')
 
 
+def label_text(estimate: TextureEstimate) -> str:
+    """Return the label as text: one that must not be used carries a question mark and why, 'felt?, rejected: novel'."""
+    if estimate.accepted:
+        return estimate.label
+    return f'{estimate.label}?, rejected: {in_words(estimate.rejection)}' if estimate.label else ''
+
+
 def texture_text(estimate: TextureEstimate) -> str:
-    """Return a texture estimate as text, with the reason if it is rejected."""
-    if not estimate.label:
+    """Return a texture estimate as text; of a rejected one first the reason, then what else the classifier notes."""
+    if not estimate.label and not estimate.windows:
         return estimate.message or 'none yet'
-    nearest = f'{estimate.label}, confidence {estimate.confidence:.2f} after {estimate.evidence_s:.1f} s'
+    nearest = f'{estimate.label or "several"}, confidence {estimate.confidence:.2f} after {estimate.evidence_s:.1f} s'
     if estimate.accepted:
         return nearest
-    reason = UNLIKE if estimate.rejection is Rejection.NOVEL else in_words(estimate.rejection)
-    return f'unknown (nearest: {nearest}): {estimate.message or reason}'
+    reason, note = REASONS.get(estimate.rejection, in_words(estimate.rejection)), estimate.message
+    why = note if note.startswith(reason) else '; '.join(filter(None, (reason, note)))
+    return f'unknown (nearest: {nearest}): {why}'
 
 
 def roughness_text(estimate: RoughnessEstimate) -> str:
@@ -233,6 +243,7 @@ class Feed:
         self._texture = TextureEstimate(0, '')
         self._model = ModelInfo(0)
         self._roughness = RoughnessEstimate(0, '')
+        self._began_s = math.inf  # the first frame
         self.recorded = False  # the messages come from a bag, in which no node can report
         self.recording = ''  # folder that is being recorded to
         self.working = ''  # last message of a sub-command that the page has started
@@ -269,9 +280,8 @@ class Feed:
 
     def on_texture(self, estimate: TextureEstimate) -> None:
         """Take an estimate; one of an exploration before the present one only enters its summary."""
-        reported = {'label': estimate.label, 'confidence': _number(estimate.confidence), 'accepted': estimate.accepted}
         if estimate.exploration_id in self._past:
-            self._note(estimate.exploration_id, reported)
+            self._note(estimate.exploration_id, {'label': label_text(estimate)})
         if estimate.exploration_id == self._texture.exploration_id or not self._texture.exploration_id:
             self._texture = estimate
 
@@ -298,12 +308,13 @@ class Feed:
 
     def frame(self, time_s: float) -> dict[str, Any]:
         """Return everything that is shown at a time of the monotonic clock, s, as JSON can carry it."""
+        self._began_s = min(self._began_s, time_s)
         return {
             'signal': self._signal(),
             'spectrum': self._spectrum(),
             'taxels': self._image(),
             'state': _shown(self._state),
-            'texture': self._evidence(),
+            'texture': self._evidence(time_s),
             'roughness': {**_shown(self._roughness), 'text': roughness_text(self._roughness)},
             'lights': self.node_statuses.shown(time_s),
             'past': list(reversed(self._past.values())),
@@ -332,22 +343,25 @@ class Feed:
         least = {'least_range': _number(taxels.least_range)}
         return {'values': _numbers(taxels.image), 'places': taxels.places, 'unit': taxels.unit, **least}
 
-    def _missing(self) -> str:
-        """Return that there is no estimate yet, with the status of the classifier if that is not OK."""
+    def _missing(self, time_s: float) -> str:
+        """Return that there is no estimate yet, with the status of the classifier if that is not OK.
+
+        Nodes report once a second: that none does is known after some of them.
+        """
         if self.recorded:
             return 'no estimate'
         level, message = self.node_statuses.newest('classifier') or ('', '')
-        if not level:
+        if not level and time_s - self._began_s > SILENT_S:
             return 'no estimate yet, and no classifier reports on /diagnostics'
-        return 'no estimate yet' + ('' if level == 'OK' else f': {message}')
+        return 'no estimate yet' + (f': {message}' if level not in ('', 'OK') else '')
 
-    def _evidence(self) -> dict[str, Any]:
+    def _evidence(self, time_s: float) -> dict[str, Any]:
         """Return the estimate with the most probable labels first."""
         estimate, model = self._texture, self._model
         fits = (estimate.model, estimate.revision) == (model.model, model.revision)  # else the labels come in a moment
         labels = model.labels if fits else ()
         pairs = sorted(zip(estimate.probabilities, labels, strict=False), reverse=True)[:MAX_LABELS]
-        missing = '' if estimate.label or estimate.message else self._missing()
+        missing = '' if estimate.label or estimate.message else self._missing(time_s)
         return {
             **_shown(estimate),
             'accepted': estimate.accepted,

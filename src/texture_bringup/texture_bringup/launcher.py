@@ -43,6 +43,7 @@ from texture_core.errors import InvalidLaunch, LaunchFailed, TextureError, Unkno
 # A sub-command as a child process of another program, which watches and ends it.
 
 ChildT = TypeVar('ChildT', bound='Child')
+CAUSE = '[launch] the launch ended because '
 STOP_DEADLINE_S = 30.0  # a launcher kills its nodes after 8 s, a recorder may be behind
 
 
@@ -59,6 +60,8 @@ def ending_with_parent(number: str, command_line: Iterable[str]) -> list[str]:
 
 class Child:
     """Run a sub-command of `texture`; use it in a `with` block."""
+
+    called = 'the command'
 
     def __init__(self, arguments: Sequence[str], environment: Mapping[str, str], log: Path) -> None:
         self.log = log
@@ -84,11 +87,13 @@ class Child:
 
     @property
     def end(self) -> str:
-        """The last line of the log, which names the cause, if the child has ended; else ''."""
-        if self._process is None or self._process.poll() is None:
+        """How the child has ended, with the cause if its last line is one; '' while it runs."""
+        if self._process is None or (code := self._process.poll()) is None:
             return ''
-        last = self.log.read_text(errors='replace').rstrip().rpartition('\n')[2].removeprefix('[launch] ')
-        return last or 'it ended'
+        last = self.log.read_text(errors='replace').rstrip().rpartition('\n')[2]
+        if last.startswith(CAUSE):
+            return last.removeprefix('[launch] ')
+        return f'{self.called} {ending(code)}{f": {last}" * bool(FAULT.match(last))}'
 
     def stop(self) -> None:
         """Stop the child and wait until nothing of it is left."""
@@ -104,6 +109,8 @@ class Child:
 
 class ChildLauncher(Child):
     """Run `texture launch FILE …`, whose nodes end together."""
+
+    called = 'the launch'
 
     def __init__(self, file: str, arguments: Mapping[str, object], environment: Mapping[str, str], log: Path) -> None:
         given = (f'{name}:={value}' for name, value in arguments.items())
@@ -238,6 +245,10 @@ def ending(returncode: int) -> str:
     return f'was killed by {names.get(-returncode, f"signal {-returncode}")}'
 
 
+# An explorer that was killed or failed lifts no finger.
+PRESSES = 'the arm may continue to press: raise the finger by freedrive or pendant before you launch again'
+
+
 # --------------------
 # Run the nodes of a launch file: show their output, restart those that may be restarted, leave no process behind.
 
@@ -285,7 +296,7 @@ class Supervisor:
                 for number, handler in handlers.items():
                     signal.signal(number, handler)
         if self._cause:  # repeated, as nodes that are being stopped write many lines
-            self._say(f'[launch] the launch ended because {self._cause}')
+            self._say(f'{CAUSE}{self._cause}')
         return self._code
 
     def stop(self) -> None:
@@ -338,12 +349,14 @@ class Supervisor:
         needed = node.needed or node.respawn or (self._together and code != 0)
         if code != 0 and not (stopping or restart):
             self._code = MISTAKE if code == MISTAKE and needed else 1
-        self._say(f'[launch] {node.label} {ending(code)}')
+        pressing = f'; {PRESSES}' * (node.executable == 'explorer' and code not in (0, MISTAKE))
+        self._say(f'[launch] {node.label} {ending(code)}{pressing}')
         if restart:
             self._due.append((time.monotonic() + node.respawn_delay_s, node, process.deaths + 1))
         elif needed and not stopping:
             self._say(f'[launch] {node.label} is required by the other nodes, which are stopped now')
-            self._cause = f'{node.label} {ending(code)}{f": {process.fault}" * bool(code and process.fault)}'
+            fault = f': {process.fault}' * bool(code and process.fault)
+            self._cause = f'{node.label} {ending(code)}{fault}{pressing}'
             self.stop()
 
 

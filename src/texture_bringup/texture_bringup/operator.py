@@ -5,8 +5,11 @@
 from __future__ import annotations
 
 import math
+import signal
+import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -43,7 +46,34 @@ from texture_core.errors import (
     TextureError,
 )
 from texture_core.ros import FEATURE_QOS, LEVELS, SENSOR_QOS, STATE_QOS, from_msg, has_ended, quality_of_service, to_msg
-from texture_core.types import ExplorationRequest, ExplorationState, FeatureVector, RoughnessEstimate, TextureEstimate
+from texture_core.types import (
+    NANOSECONDS,
+    ExplorationRequest,
+    ExplorationState,
+    FeatureVector,
+    RoughnessEstimate,
+    TextureEstimate,
+)
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Raise the KeyboardInterrupt of a signal behind the block: within rclpy it would become another error."""
+    if threading.current_thread() is not threading.main_thread():  # which alone gets signals
+        yield
+        return
+    caught: list[int] = []
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    ours = [number for number, handler in before.items() if handler is signal.default_int_handler]
+    for number in ours:
+        signal.signal(number, lambda got, _frame: caught.append(got))
+    try:
+        yield
+    finally:
+        for number in ours:
+            signal.signal(number, before[number])
+    if caught:
+        raise KeyboardInterrupt
 
 
 def middleware() -> str:
@@ -72,18 +102,29 @@ def parameter_from_text(name: str, text: str, kind: int) -> Parameter:
 # --------------------
 # Messages of the nodes in a namespace, for display.
 
+HISTORY_NS = 3 * NANOSECONDS
 
-def subscribe(node: Node, feed: Feed, on_bad: Callable[[InvalidData], None]) -> None:
-    """Pass all messages from now on to a feed; `on_bad` is called with the error of an inconsistent message."""
 
-    def taking(take: Callable[[Any], None]) -> Callable[[Any], None]:
+def subscribe(node: Node, feed: Feed, on_bad: Callable[[InvalidData], None], *, history: bool = True) -> None:
+    """Pass all messages from now on to a feed; `on_bad` is called with the error of an inconsistent message.
+
+    Without `history`, latched states and estimates that were sent before are left out, but for the last seconds.
+    """
+    oldest_ns = time.time_ns() - HISTORY_NS
+
+    def taking(take: Callable[[Any], None]) -> Callable[..., None]:
         def on_message(message: Any) -> None:
             try:
                 take(from_msg(message))
             except InvalidData as error:
                 on_bad(error)
 
-        return on_message
+        # By the time of sending: a replayed message bears the time of its recording. EventsExecutor has no `info`.
+        def on_new(message: Any, info: Mapping[str, int]) -> None:
+            if isinstance(message, msg.ModelInfo) or info['source_timestamp'] >= oldest_ns:
+                on_message(message)
+
+        return on_message if history else on_new
 
     def note_diagnostics(message: DiagnosticArray) -> None:
         ours = node.get_namespace().rstrip('/') + '/'
@@ -193,7 +234,7 @@ class Operator:
         """Wait until explorations can be requested; the wait is shown after `quiet_s`."""
         advice, ours = 'start one, such as the emulator with `texture launch emulator`', self._node.get_namespace()
         try:
-            with task(f"waiting for an explorer in the namespace '{ours}'; {advice}", quiet_s=quiet_s):
+            with task(f"waiting for an explorer in the namespace '{ours}', which may be starting", quiet_s=quiet_s):
                 self.wait_until(self._explore.server_is_ready, deadline_s, f'no explorer answers; {advice}')
         except KeyboardInterrupt:
             raise KeyboardInterrupt('nothing was requested') from None
@@ -262,18 +303,20 @@ class Operator:
         if stopped():
             raise MotionRefused('the request was stopped before it was sent', ExplorationError.STOPPED)
         accepted = self._explore.send_goal_async(action.Explore.Goal(request=to_msg(request)), on_feedback, goal_id)
-        silent = 'the explorer accepts no request; stop it, and check that no second one runs'
+        silent = (
+            'the explorer is not ready yet, it may be connecting to the arm; stop it, and check that no second one runs'
+        )
         try:
             self.wait_until(accepted.done, ACCEPT_S, silent, MotionAborted)
         except MotionAborted as error:
             withdrawn = self._withdraw(goal_id)
-            self._executor.spin_until_future_complete(withdrawn, CONFIRM_S)
+            self._complete(withdrawn, CONFIRM_S)
             confirmed = withdrawn.done() and withdrawn.result().goals_canceling  # none if the goal is unknown there
             how = 'it has confirmed' if confirmed else 'look at the robot: it has not confirmed'
             raise MotionAborted(f'{error}; {how} that the request is withdrawn') from error
         except KeyboardInterrupt:  # the explorer may have the request already
             self._withdraw(goal_id)
-            self._executor.spin_until_future_complete(accepted, CANCEL_DEADLINE_S)
+            self._complete(accepted, CANCEL_DEADLINE_S)
             goal = accepted.result()
             raise KeyboardInterrupt(self._cancel(goal, goal.get_result_async()) if goal else _unconfirmed()) from None
         goal, cancelled = accepted.result(), False
@@ -339,14 +382,14 @@ class Operator:
         """
         name = f"the service '{self._node.resolve_service_name(service)}'"
         missing = f'no node offers {name}; {advice}'
-        silent = silent or f'{name} does not answer; look at the robot, and at the output of its node'
+        silent = silent or f'{name} has not answered yet; look at the robot, and at the output of its node'
         answer = self._ask(Trigger, service, Trigger.Request(), missing, silent, answer_s=answer_s)
         return bool(answer.success), str(answer.message)
 
     def set_active(self, node: str, active: bool) -> str:
         """Bring a lifecycle node to the state 'active', over 'inactive', or from it back to 'inactive'."""
         missing = f"no lifecycle node '{node}' answers; start it, or give its --namespace"
-        silent = f"node '{node}' does not answer; look at its output"
+        silent = f"node '{node}' has not answered yet; look at its output"
         for _ in range(3):  # two transitions at most, and a look at the state behind them
             state = self._ask(GetState, f'{node}/get_state', GetState.Request(), missing, silent)
             label = str(state.current_state.label)
@@ -375,7 +418,7 @@ class Operator:
 
     def watch(self, feed: Feed, show: Callable[[], None]) -> None:
         """Let a feed take what the nodes publish, and call `show` after each message, until Ctrl-C."""
-        subscribe(self._node, feed, lambda _error: None)
+        subscribe(self._node, feed, lambda _error: None, history=False)
         while True:
             self._step()
             show()
@@ -401,7 +444,10 @@ class Operator:
 
     def _ask_classifier(self, kind: Any, name: str, request: Any) -> Any:
         """Return the answer of a service of the classifier that succeeded."""
-        missing, silent = 'no classifier answers; is it running?', 'the classifier does not answer; look at its output'
+        missing, silent = (
+            'no classifier answers; is it running?',
+            'the classifier has not answered yet; look at its output',
+        )
         answer = self._ask(kind, name, request, missing, silent)
         if not answer.success if kind is Trigger else answer.error_code:
             raise InvalidData(answer.message)
@@ -450,7 +496,7 @@ class Operator:
 
     def _answer(self, node: str, future: Future) -> Any:
         """Return the answer of a node that may run without an explorer."""
-        self.wait_until(future.done, ANSWER_S, f"node '{node}' does not answer")
+        self.wait_until(future.done, ANSWER_S, f"node '{node}' has not answered yet")
         return future.result()
 
     def _hear(self, _state: bytes) -> None:
@@ -459,9 +505,12 @@ class Operator:
     def wait_until(
         self, condition: Callable[[], bool], deadline_s: float, complaint: str, error: type[TextureError] = LaunchFailed
     ) -> None:
-        """Wait until a condition holds, or raise the error with the complaint."""
+        """Wait until a condition holds, or raise the error with the complaint.
+
+        What to do, behind its first semicolon, is not shown before the time is over.
+        """
         deadline = time.monotonic() + deadline_s
-        with task(f'waiting: {complaint}'):
+        with task(f'waiting: {complaint.partition("; ")[0]}'):
             while not condition():
                 if time.monotonic() > deadline:
                     raise error(f'{complaint} (waited {deadline_s:.0f} s)')
@@ -469,7 +518,15 @@ class Operator:
 
     def _step(self) -> None:
         self._guard()
-        self._executor.spin_once(timeout_sec=STEP_S)
+        with uninterrupted():
+            self._executor.spin_once(timeout_sec=STEP_S)
+
+    def _complete(self, future: Future, deadline_s: float) -> None:
+        """Spin until a future is done or the time is over; the guard is not asked."""
+        end_s = time.monotonic() + deadline_s
+        while not future.done() and time.monotonic() < end_s:
+            with uninterrupted():
+                self._executor.spin_once(timeout_sec=STEP_S)
 
     def _withdraw(self, goal_id: Any) -> Future:
         """Cancel a request that was not accepted: an explorer that accepts it later must not run it."""
@@ -479,10 +536,8 @@ class Operator:
     def _cancel(self, goal: Any, ending: Future) -> str:
         """Cancel, wait until the finger is lifted, and return in a sentence how it ended."""
         goal.cancel_goal_async()
-        deadline = time.monotonic() + CANCEL_DEADLINE_S
         with task(f'waiting for the end of the exploration; {EMERGENCY}'):
-            while not ending.done() and time.monotonic() < deadline:
-                self._executor.spin_once(timeout_sec=STEP_S)
+            self._complete(ending, CANCEL_DEADLINE_S)
         if not ending.done():
             return _unconfirmed()
         return f'the exploration has ended: {ending.result().result.result.message}'

@@ -136,6 +136,9 @@ def test_what_cannot_be_trained_is_refused_with_a_sentence(model, silk, measured
         classifier.add('silk', 'e9')
     with pytest.raises(InvalidData, match='no label'):
         classifier.add('  ')
+    classifier.begin('stopped-early')
+    with pytest.raises(InvalidData, match=r"'stopped-early' has no usable window: it ended before its slide .*: e1$"):
+        classifier.add('silk')
 
 
 def test_a_example_that_cannot_be_kept_is_not_learnt(model, silk, tmp_path, measured):

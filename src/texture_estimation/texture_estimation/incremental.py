@@ -58,6 +58,10 @@ class IncrementalClassifier:
         self._recent_windows: OrderedDict[str, list[Array]] = OrderedDict()
         self._conditions: dict[str, RunningConditions] = {}  # of the same explorations
 
+    def begin(self, exploration_id: str) -> None:
+        """Note an exploration as the newest one: if it ends before it slides, no earlier one takes its place."""
+        self._recent_windows_of(exploration_id)
+
     def observe(self, vector: FeatureVector) -> None:
         """Keep a window, so that its exploration can be added."""
         windows = self._recent_windows_of(vector.exploration_id)
@@ -104,8 +108,8 @@ class IncrementalClassifier:
         if not self._recent_windows:
             raise ChangeRefused('no exploration was classified with this model; explore first', ChangeError.NO_SLIDE)
         reason = (
-            f"exploration '{exploration_id}' has no usable window: its slide was too short, its samples were lost, or "
-            'its features do not fit the model'
+            f"exploration '{exploration_id}' has no usable window: it ended before its slide or a window of it, its "
+            'samples were lost, or its features do not fit the model'
             if exploration_id in self._recent_windows
             else f"no exploration '{exploration_id}' is among the last {EXPLORATIONS}"
         )

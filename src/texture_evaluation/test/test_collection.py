@@ -216,6 +216,16 @@ def test_the_first_surface_of_a_folder_ends_with_the_fewest_places():
     assert 'the folder holds no other surface yet' in end.message
 
 
+def test_slides_that_add_no_place_are_explained():
+    _, reports = run([PlaceAccuracy(1, 0), PlaceAccuracy(4, 0)])
+    assert reports[0] == (
+        3,
+        '1 place; the folder holds no other surface yet; 2 fewer than slides, as a slide near another, or without a '
+        'whole window (short, or samples lost), adds no place',
+    )
+    assert reports[1] == (4, '4 places; the folder holds no other surface yet')
+
+
 def test_three_failures_in_a_row_end_it_and_two_do_not():
     failed = [(ExplorationError.FORCE_LIMIT, text) for text in ('the patch ends', 'too hard', 'a', 'b', 'c')]
     end, reports = run([PlaceAccuracy(3, 3, '', 1)] * 3, [DONE, *failed[:2], DONE, DONE, *failed[2:]])

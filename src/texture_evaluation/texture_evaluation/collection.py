@@ -229,7 +229,7 @@ class PlaceAccuracy:
     def sentence(self) -> str:
         """Results so far."""
         if not self.others:
-            return f'{self.places} places; the folder holds no other surface yet'
+            return f'{self.places} place{"s" * (self.places != 1)}; the folder holds no other surface yet'
         mistaken = f', mostly misidentified as {self.confused}' if self.confused else ''
         found = (
             f'{self.correct} of {self.places} left-out places correct{mistaken}; at new places at least '
@@ -304,6 +304,9 @@ def _distance_m(place: str, other: str) -> float:
 
 EVERY = 3  # places after which it is evaluated
 FAILURES = 3  # in a row end it
+UNCOUNTED = (
+    'fewer than slides, as a slide near another, or without a whole window (short, or samples lost), adds no place'
+)
 ASKED_TO_END = {ExplorationError.STOPPED, ExplorationError.CANCELLED, ExplorationError.NOT_ACTIVE}
 
 
@@ -350,7 +353,8 @@ def collect(
             if slides % EVERY and slides not in (params.places, params.most_places):
                 continue
             accuracy = evaluate_all(slides)
-            tell(accuracy.sentence, slides)
+            fewer = max(0, slides - accuracy.places)
+            tell(f'{accuracy.sentence}{f"; {fewer} {UNCOUNTED}" * bool(fewer)}', slides)
             # The first surface of a folder has nothing to be distinguished from.
             met = accuracy.bound >= params.bound if accuracy.others else True
             if slides >= params.places and met:

@@ -10,11 +10,15 @@ const CURVES = ['--accent', '--second', '--third'];
 const AXIS = { left: 48, bottom: 18, top: 14 };
 const MAX_FRAMES = 300; // of one exploration; a longer one is thinned to every second frame, again and again
 const ENDED = ['idle', 'done', 'aborted'];
+const PRESSES = 'the arm may continue to press: look at the robot'; // an explorer that was killed does not lift
 const at = (id) => document.getElementById(id);
 let replaying = null;
 const kept = new Map(); // what was shown of each exploration that is listed: texts, every how many, how many came
 let last = 0;
 let connected = false;
+let phase = '';
+let stopping = false; // until the idle state says whether the finger was lifted
+let newest = ''; // id of the last exploration
 let curve = { id: '', points: [] };
 
 const shown = (value, digits, unit) => (value === null || value === undefined ? '–' : `${value.toFixed(digits)} ${unit}`);
@@ -253,6 +257,12 @@ function showFrame(frame) {
 }
 
 function showRest(frame) {
+  phase = frame.state.phase;
+  if (stopping && phase === 'idle') {
+    stopping = false;
+    say(frame.state.lifted ? 'stopped; the finger is lifted' : 'stopped; the finger was not lifted: look at the robot', !frame.state.lifted);
+  }
+  newest = frame.past.length ? frame.past[0].id : '';
   fill(at('lights'), frame.lights, (light) => element('li', `${light.name}: ${light.message}`, light.colour));
   at('record').textContent = frame.recording ? 'End recording' : 'Record';
   at('record').dataset.on = frame.recording ? 'yes' : '';
@@ -304,11 +314,14 @@ function replay(id) {
 }
 
 async function ask(name, body) {
+  const moving = phase && !ENDED.includes(phase);
+  stopping = false;
   try {
     const answer = await fetch(`api/${name}`, {
       method: 'POST', headers: { 'Content-Type': 'application/json' }, body: JSON.stringify(body),
     });
     const reply = await answer.json();
+    stopping = name === 'stop' && moving && reply.success;
     say(reply.message, !reply.success);
   } catch (error) {
     say(`'${name}' got no answer: ${error.message}`, true);
@@ -352,6 +365,7 @@ function connect() {
   socket.onclose = () => {
     connected = false;
     at('phase').textContent = 'not connected';
+    say(`not connected: the nodes may have ended; ${PRESSES}`, true);
     at('phase').className = 'phase aborted';
     window.setTimeout(connect, RETRY_MS);
   };
@@ -370,7 +384,7 @@ at('explore').addEventListener('submit', (event) => {
 });
 at('learn').addEventListener('submit', (event) => {
   event.preventDefault();
-  ask('add', { label: at('texture').value.trim() });
+  ask('add', { label: at('texture').value.trim(), id: newest });
 });
 at('stop').addEventListener('click', () => ask('stop', {}));
 at('undo').addEventListener('click', () => ask('add', { undo: true }));
@@ -381,6 +395,6 @@ at('collect').addEventListener('submit', (event) => {
 document.querySelectorAll('[data-ask]').forEach((button) => button.addEventListener('click', () => ask(button.dataset.ask, {})));
 at('record').addEventListener('click', () => ask('record', { on: !at('record').dataset.on }));
 window.setInterval(() => {
-  if (!connected || Date.now() - last > SILENT_MS) say('no data from the dashboard; is it still running?', true);
+  if (!connected || Date.now() - last > SILENT_MS) say(`no data from the dashboard; is it still running? ${PRESSES}`, true);
 }, SILENT_MS);
 connect();

@@ -271,7 +271,13 @@ def _identify(options: argparse.Namespace) -> int:
             likely = np.argsort(-belief, kind='stable')[:SHOWN]
             print(f'  {", ".join(f"{known.textures[k]} {np.exp(belief[k]):.2f}" for k in likely)}')
     best = int(belief.argmax())
-    print(f'texture: {known.textures[best]}, probability {np.exp(belief[best]):.2f} after {number} slides')
+    found = f'{known.textures[best]}, probability {np.exp(belief[best]):.2f} after {number} slides'
+    decided = np.exp(belief[best]) >= options.sure
+    print(
+        f'texture: {found}'
+        if decided
+        else f'texture: undecided, --sure {options.sure:g} is not reached (nearest: {found})'
+    )
     return 0
 
 
@@ -322,13 +328,16 @@ def collect_surface(
                 except (MotionRefused, MotionAborted) as error:
                     return error.error, str(error)
                 if explored.success:
+                    lost = recording.wait_for(explored.exploration_id)
                     made += 1
-                    if (lost := recording.wait_for(explored.exploration_id)) != losses:
+                    if lost != losses:
                         losses = lost
                         _print_progress(losses, made)
                 return explored.error, explored.message
 
             end = collection.collect(plan, params, explore, partial(_evaluate_bag, bag, surface), _print_progress)
+            if recording.end and end.error is not CollectionError.NOT_RECORDED:  # in the last evaluation, say
+                end = replace(end, error=CollectionError.NOT_RECORDED, message=f'{recording.end}; {end.message}')
     except LaunchFailed:  # the recorder was not discovered
         _remove(bag)
         raise
@@ -376,13 +385,15 @@ def unfinished_bags() -> Iterator[None]:
 class RecorderProcess(Child):
     """Record a bag in a separate process, which reports in its log what is on the disk."""
 
+    called = 'the recorder'
+
     def __init__(self, bag: Path, namespace: str, log: Path) -> None:
         super().__init__(['record', str(bag), '--namespace', namespace], os.environ, log)
 
     def check(self) -> None:
-        """Raise InvalidData, with its last message, if it has ended."""
+        """Raise InvalidData if it has ended."""
         if self.end:
-            raise InvalidData(f'the recorder ended: {self.end}')
+            raise InvalidData(self.end)
 
     def wait_for(self, exploration_id: str) -> str:
         """Return what was lost so far, '' if nothing, once an exploration is on the disk; InvalidData if it is not."""
@@ -407,7 +418,7 @@ def recorder(operator: Operator, bag: Path, namespace: str) -> Iterator[Recorder
         operator.wait_until(
             lambda: records(bag, recording.check),
             RECORDER_S,
-            f'the recorder that starts has no {" and ".join(RECORDED)}',
+            f'the recorder has received no {" and ".join(RECORDED)} yet; look at the output of sensor and explorer',
         )
         yield recording
 
@@ -432,7 +443,10 @@ def _configure_collect(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('surface', help='label of the surface under the finger')
     parser.add_argument('folder', type=Path, help='folder of the bags of all surfaces; made if missing')
     shape: dict[str, Any] = {'type': float, 'nargs': 2, 'default': (0.0, 0.0), 'metavar': ('LOW', 'HIGH')}
-    speed, force = 'speeds of the slides, m/s (default: 0.02 to 0.05)', 'normal forces, N (default: 1 to 2)'
+    speed, force = (
+        'lowest and highest speed, m/s (default: 0.02 0.05)',
+        'lowest and highest normal force, N (default: 1 2)',
+    )
     parser.add_argument('--speed', help=f'{speed}, as far as the explorer allows', **shape)
     parser.add_argument('--force', help=f'{force}, or the lowest that the explorer allows to twice that', **shape)
     add_parameters(parser, CollectionParams, without=SHORTER)

@@ -78,7 +78,7 @@ def refuse_wrong(nodes: Sequence[NodeDescription], given: set[str]) -> None:
     if wanted:
         with ProcessPoolExecutor(1, get_context('fork')) as pool:
             checks = [pool.submit(_look_at, *one) for one in wanted]
-            with task('check the files that the launch names'):  # behind the fork, which copies no thread
+            with task('checking the files that the launch names'):  # behind the fork, which copies no thread
                 for check in checks:
                     check.result()
 

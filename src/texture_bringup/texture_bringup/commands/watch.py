@@ -35,18 +35,15 @@ def run(options: argparse.Namespace) -> int:
     """Show what happens until Ctrl-C or the end of the bag: a picture on a terminal, else a line for each change."""
     feed, console = Feed(), Console()
     live = Live(console=console, auto_refresh=False) if console.is_terminal else nullcontext()
-    try:
-        with live:
-            show = _picture(feed, live) if isinstance(live, Live) else _lines(feed)
-            if options.bag:
-                _play(options.bag, options.namespace, feed, show)
-            else:
-                from texture_bringup.operator import Operator  # noqa: PLC0415 - a bag is shown without ROS
+    with live:
+        show = _picture(feed, live) if isinstance(live, Live) else _lines(feed)
+        if options.bag:
+            _play(options.bag, options.namespace, feed, show)
+        else:
+            from texture_bringup.operator import Operator  # noqa: PLC0415 - a bag is shown without ROS
 
-                with Operator(options.namespace) as operator:
-                    operator.watch(feed, show)
-    except KeyboardInterrupt:  # the usual end of it
-        return 0
+            with Operator(options.namespace) as operator:
+                operator.watch(feed, show)
     return 0
 
 

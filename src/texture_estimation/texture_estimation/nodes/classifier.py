@@ -19,6 +19,7 @@ from texture_core.errors import InvalidParameter, ModelMismatch, TextureError, U
 from texture_core.ros import (
     ESTIMATE_QOS,
     FEATURE_QOS,
+    STATE_QOS,
     DiagnosticReport,
     Diagnostics,
     declare,
@@ -142,8 +143,10 @@ class Classifier(EstimatorNode):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('classifier', **kwargs)
         self._revision = 0
+        self._exploration_id = ''  # of the newest exploration, also of one that ends before it slides
         self._model_infos = self.create_publisher(msg.ModelInfo, 'model_info', quality_of_service('model_info'))
         self._publish_model()
+        self.create_subscription(msg.ExplorationState, 'exploration', self._on_state, STATE_QOS)
         self.create_service(srv.AddTexture, '~/add_texture', self._on_add)
         self.create_service(Trigger, '~/remove_last_added', self._on_remove_last)
         self.create_service(srv.RemoveTexture, '~/remove_texture', self._on_remove)
@@ -157,6 +160,12 @@ class Classifier(EstimatorNode):
         if self._incremental_classifier is not None:
             self._incremental_classifier.observe(vector)
         return replace(super()._predict(vector), revision=self._revision)
+
+    def _on_state(self, state: msg.ExplorationState) -> None:
+        if state.exploration_id not in ('', self._exploration_id):
+            self._exploration_id = state.exploration_id
+            if self._incremental_classifier is not None:
+                self._incremental_classifier.begin(state.exploration_id)
 
     def _change(self, params: EstimatorParams) -> None:
         super()._change(params)
