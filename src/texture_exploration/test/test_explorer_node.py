@@ -311,7 +311,7 @@ def test_a_changed_limit_holds_for_the_next_request(world):
     assert world.explorer.set_parameters([slower])[0].successful
     assert 'allowed is 0.002 to 0.05 m/s' in world.explored(**QUICK).message
     wrong = world.explorer.set_parameters([Parameter('force_limit_n', value=1.0)])[0]
-    assert "it must be above 'max_force_n'" in wrong.reason
+    assert "it must be below 'force_limit_n'" in wrong.reason
 
 
 def test_the_diagnostics_count_what_happened(world):

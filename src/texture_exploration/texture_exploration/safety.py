@@ -31,6 +31,12 @@ RANGES: Mapping[str, tuple[float | str, float | str, str]] = {
     'turns': (0.1, 100.0, 'turns'),
     'duration_s': (0.1, 60.0, 's'),
 }
+# Limits of which the first must be below the second.
+ORDERED = (
+    *((f'{axis}_low_m', f'{axis}_high_m', 'm') for axis in 'xyz'),
+    ('min_force_n', 'max_force_n', 'N'),
+    ('max_force_n', 'force_limit_n', 'N'),
+)
 # Several turns are also a direction; an angle beyond this one is a mistake, and loses precision by rounding.
 MAX_DIRECTION_RAD = 100.0
 
@@ -54,7 +60,7 @@ class SafetyLimits:
     """Limits of requests, of measurements and of the duration of each phase."""
 
     max_speed_m_s: float = param(
-        0.25, 'Highest speed that may be requested; a faster one is refused.', unit='m/s', low=1e-4, high=1.0
+        0.25, 'Highest speed that may be requested; a faster one is refused.', unit='m/s', low=0.002, high=1.0
     )
     min_force_n: float = param(
         0.1, 'Lowest normal force that may be requested; a smaller one is refused.', unit='N', low=0.01
@@ -92,21 +98,10 @@ class SafetyLimits:
     lift_timeout_s = 5.0  # that braking and lifting may take: three times what they do
 
     def __post_init__(self) -> None:
-        for axis, (low, high) in self.workspace.items():
-            if not low < high:
-                raise InvalidParameter(
-                    f"parameter '{axis}_low_m' is {low:g}; it must be below '{axis}_high_m', which is {high:g} m"
-                )
-        for name, (of_low, of_high, unit) in RANGES.items():
-            lowest, highest, _ = self.range(name)
-            if not lowest <= highest:
-                least = f"'{of_low}', which is {lowest:g}" if isinstance(of_low, str) else f'{lowest:g}'
-                raise InvalidParameter(f"parameter '{of_high}' is {highest:g}; it must be at least {least} {unit}")
-        if self.force_limit_n <= self.max_force_n:
-            raise InvalidParameter(
-                f"parameter 'force_limit_n' is {self.force_limit_n}; "
-                f"it must be above 'max_force_n', which is {self.max_force_n} N"
-            )
+        for lower, higher, unit in ORDERED:
+            low, high = getattr(self, lower), getattr(self, higher)
+            if not low < high and (low, lower) != (high, 'min_force_n'):  # a single force may be allowed
+                raise InvalidParameter(f"'{lower}' is {low:g}; it must be below '{higher}', {high:g} {unit}")
 
     @property
     def workspace(self) -> dict[str, tuple[float, float]]:
@@ -229,17 +224,6 @@ class SurfacePatch:
     patch_x_high_m: float = _edge(0.0, 'Highest x', PATCH)
     patch_y_low_m: float = _edge(0.0, 'Lowest y', PATCH)
     patch_y_high_m: float = _edge(0.0, 'Highest y', PATCH)
-
-    def __post_init__(self) -> None:
-        for axis, low, high in (
-            ('x', self.patch_x_low_m, self.patch_x_high_m),
-            ('y', self.patch_y_low_m, self.patch_y_high_m),
-        ):
-            if not low <= high:
-                raise InvalidParameter(
-                    f"parameter 'patch_{axis}_low_m' is {low:g}; it must not be above 'patch_{axis}_high_m', which is "
-                    f'{high:g} m'
-                )
 
     def start(self, request: ExplorationRequest, home: Vector, limits: SafetyLimits) -> Vector:
         """Return where an exploration begins: at `home`, or above its start at the same height."""
