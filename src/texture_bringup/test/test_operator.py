@@ -195,12 +195,15 @@ def test_who_watches_sees_no_state_that_was_sent_long_before(monkeypatch):
 
 
 def test_ctrl_c_ends_the_program_behind_what_rclpy_does_and_not_within():
-    done = []
-    with pytest.raises(KeyboardInterrupt), operators.uninterrupted():
-        signal.raise_signal(signal.SIGINT)
-        done.append('taken')
-    assert done == ['taken']
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    done, before = [], signal.signal(signal.SIGINT, signal.default_int_handler)  # as the command does
+    try:
+        with pytest.raises(KeyboardInterrupt), operators.uninterrupted():
+            signal.raise_signal(signal.SIGINT)
+            done.append('taken')
+        assert done == ['taken']
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def test_what_to_do_is_said_when_the_time_is_over_and_not_while_it_runs(monkeypatch):
