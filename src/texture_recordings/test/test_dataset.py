@@ -68,6 +68,8 @@ def test_a_slide_whose_force_was_wrong_is_left_out_and_named(tmp_path: Path, cap
     good = write(tmp_path / 'good', ['cork'], 200)
     assert [slide.name for slide in find_slides([stopped, drifted, good])] == ['cork/1', 'cork/3']
     assert 'left out, as the force sensor was wrong in their explorations: cork/2' in caplog.text
+    with pytest.raises(InvalidData, match='the force sensor was wrong in all slides'):
+        find_slides([drifted])
 
 
 def test_a_slide_yields_its_messages_only(tmp_path: Path) -> None:

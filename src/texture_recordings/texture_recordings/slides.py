@@ -260,6 +260,8 @@ def find_slides(
         names = ', '.join(slide.name for slide in doubtful)
         logging.getLogger(__name__).warning('left out, as the force sensor was wrong in their explorations: %s', names)
         numbered = [slide for slide in numbered if not slide.force_was_wrong]
+        if not numbered:
+            raise InvalidData(f'the force sensor was wrong in all slides of {_named(paths)}; record again')
     found = [slide for slide in numbered if wanted is None or slide.number in wanted]
     if not found:
         most = max(slide.number for slide in numbered)
