@@ -437,7 +437,7 @@ def comparison_chart(results: Sequence[CrossValidation], title: str, path: str |
     with chart(path, (6.0, 5.0 + 0.5 * len(results)), title) as figure:
         accuracies, times = figure.subplots(2, 1, height_ratios=(1.4 + 0.5 * len(results), 3.6))
         _draw_accuracies(accuracies, results)
-        widths = np.linspace(3.0 * len(results), 2.0, len(results))  # of lines that coincide each is seen
+        widths = np.linspace(4.0, 1.5, len(results))  # of lines that coincide each is seen
         for result, style, width in zip(results, line_styles(), widths, strict=False):
             seconds, accuracy = curve(result.pooled)
             times.plot(seconds, 100 * accuracy, label=result.recipe, linewidth=width, clip_on=False, **style)
