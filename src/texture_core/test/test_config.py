@@ -250,10 +250,11 @@ def test_an_archive_of_a_million_empty_members_is_refused_before_they_are_listed
     entry, record = content[begin:end], content[end:]
     directory = entry * 1_000_000
     lying = content[:begin] + directory + record[:12] + len(directory).to_bytes(4, 'little') + record[16:]
+    hidden = lying[:-6] + b'PK\x05\x06' + lying[-2:]  # the mark of a record within the last one
     locator = b'PK\x06\x07' + bytes(16)  # of the larger form of the record
     tracemalloc.start()
     try:
-        for made in (lying, content[:end] + locator + record):
+        for made in (lying, hidden, content[:end] + locator + record):
             with pytest.raises(FileRefused, match='its list of members has more than 10 MB'):
                 Archive(io.BytesIO(made))
         assert tracemalloc.get_traced_memory()[1] < 100_000_000

@@ -195,7 +195,7 @@ def executable(package: str, name: str) -> Path:
 MB = 1_000_000
 MAX_FILE_BYTES = 1000 * MB
 MAX_DIRECTORY_BYTES = 10 * MB  # of a zip file: some 100 000 members
-ZIP_END_BYTES = 22 + 65_535  # its last record, and a comment
+ZIP_END, ZIP_END_BYTES, ZIP_COMMENT_BYTES = b'PK\x05\x06', 22, 65_536  # its last record, and the longest comment
 LAST_CHARACTER = 0x10FFFF  # of Unicode; NumPy keeps 32 bits for each and compares none
 # What zipfile and NumPy raise at content that is damaged, cut off or claims more than there is.
 BROKEN_CONTENT = (
@@ -312,12 +312,14 @@ class Archive:
 def _check_directory(file: IO[bytes]) -> None:
     """Refuse a zip file whose directory would fill the memory: zipfile reads all of it, whatever it claims to list."""
     size = file.seek(0, os.SEEK_END)
-    file.seek(max(0, size - ZIP_END_BYTES))
+    file.seek(max(0, size - ZIP_END_BYTES - ZIP_COMMENT_BYTES))
     end = file.read()
-    before, found, record = end.rpartition(b'PK\x05\x06')
-    directory_bytes = int.from_bytes(record[8:12], 'little') if found else 0
+    # As zipfile looks for the record: at the end, where no comment follows, else the last one of all.
+    plain = end[-ZIP_END_BYTES:][:4] == ZIP_END and end[-2:] == b'\0\0'
+    at = len(end) - ZIP_END_BYTES if plain else end.rfind(ZIP_END)
+    directory_bytes = int.from_bytes(end[at + 12 : at + 16], 'little') if at >= 0 else 0
     # The larger form of the record is for archives beyond 4 GB or 65 535 members.
-    if directory_bytes > MAX_DIRECTORY_BYTES or before[-20:-16] == b'PK\x06\x07':
+    if directory_bytes > MAX_DIRECTORY_BYTES or end[max(0, at - 20) : max(0, at - 16)] == b'PK\x06\x07':
         raise FileRefused(f'its list of members has more than {MAX_DIRECTORY_BYTES // MB} MB; save fewer arrays in it')
 
 
