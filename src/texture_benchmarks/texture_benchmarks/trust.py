@@ -130,12 +130,8 @@ COMPARED = (*RECIPES, PEER, PAPER)
 UNKNOWN_TO = (*RECIPES, 'any-place', 'any-place-and-taxels')
 TRAINED_ON, TESTED_ON, DISTURBED = SELECTED = '1-30', '31-40', '32,35,38'
 DISTURBED_DATA = f'{DATA["biotac20"]}; disturbances are computed on the recorded signals'
-MATERIALS, LEFT_OUT, DRAWS, UNKNOWN_S = (
-    20,
-    5,
-    10,
-    2.5,
-)  # all materials, materials left out in each draw, and sliding after which they are counted
+MATERIALS = 20
+LEFT_OUT, DRAWS, UNKNOWN_S = 5, 10, 2.5  # materials left out in each draw, and sliding after which they are counted
 SPLIT = (
     f'BioTac, trained on slides {TRAINED_ON}, tested on {TESTED_ON}; disturbed: {DISTURBED}; unknown: {DRAWS} draws of '
     f'{LEFT_OUT} materials that are not trained, slides of {UNKNOWN_S:g} s'

@@ -206,7 +206,7 @@ def test_ctrl_c_ends_the_program_behind_what_rclpy_does_and_not_within():
         signal.signal(signal.SIGINT, before)
 
 
-def test_what_to_do_is_said_when_the_time_is_over_and_not_while_it_runs(monkeypatch):
+def test_advice_is_shown_after_a_timeout_only(monkeypatch):
     said = []
     monkeypatch.setattr(operators, 'task', lambda what, **_: said.append(what) or nullcontext())
     monkeypatch.setattr(operators, 'ACCEPT_S', 0.2)

@@ -444,10 +444,8 @@ class Operator:
 
     def _ask_classifier(self, kind: Any, name: str, request: Any) -> Any:
         """Return the answer of a service of the classifier that succeeded."""
-        missing, silent = (
-            'no classifier answers; is it running?',
-            'the classifier has not answered yet; look at its output',
-        )
+        missing = 'no classifier answers; is it running?'
+        silent = 'the classifier has not answered yet; look at its output'
         answer = self._ask(kind, name, request, missing, silent)
         if not answer.success if kind is Trigger else answer.error_code:
             raise InvalidData(answer.message)

@@ -272,12 +272,9 @@ def _identify(options: argparse.Namespace) -> int:
             print(f'  {", ".join(f"{known.textures[k]} {np.exp(belief[k]):.2f}" for k in likely)}')
     best = int(belief.argmax())
     found = f'{known.textures[best]}, probability {np.exp(belief[best]):.2f} after {number} slides'
-    decided = np.exp(belief[best]) >= options.sure
-    print(
-        f'texture: {found}'
-        if decided
-        else f'texture: undecided, --sure {options.sure:g} is not reached (nearest: {found})'
-    )
+    if np.exp(belief[best]) < options.sure:
+        found = f'undecided, --sure {options.sure:g} is not reached (nearest: {found})'
+    print(f'texture: {found}')
     return 0
 
 
@@ -443,10 +440,8 @@ def _configure_collect(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('surface', help='label of the surface under the finger')
     parser.add_argument('folder', type=Path, help='folder of the bags of all surfaces; made if missing')
     shape: dict[str, Any] = {'type': float, 'nargs': 2, 'default': (0.0, 0.0), 'metavar': ('LOW', 'HIGH')}
-    speed, force = (
-        'lowest and highest speed, m/s (default: 0.02 0.05)',
-        'lowest and highest normal force, N (default: 1 2)',
-    )
+    speed = 'lowest and highest speed, m/s (default: 0.02 0.05)'
+    force = 'lowest and highest normal force, N (default: 1 2)'
     parser.add_argument('--speed', help=f'{speed}, as far as the explorer allows', **shape)
     parser.add_argument('--force', help=f'{force}, or the lowest that the explorer allows to twice that', **shape)
     add_parameters(parser, CollectionParams, without=SHORTER)
