@@ -151,7 +151,7 @@ def test_it_serves_the_page_of_the_operator_and_ctrl_c_ends_it_cleanly_and_leave
         _, said = demo.communicate(timeout=DEADLINE_S)
     assert demo.returncode == 130
     # A slow start has said what it waits for.
-    shown = r'((waiting:|waiting for|fit|read bags|compute features) [^\n]*\n)*'
+    shown = r'((waiting:|waiting for|fitting|reading bags|computing features) [^\n]*\n)*'
     assert re.fullmatch(rf'{shown}texture: interrupted\n', said), said
     assert 'Traceback' not in said
     assert len(pids) == 8

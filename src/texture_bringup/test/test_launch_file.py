@@ -132,6 +132,8 @@ def test_an_include_gets_its_arguments_and_leaves_them_set_as_upstream_does(laun
     inner.write_text('<launch><arg name="n" default="none"/><node pkg="p" exec="e" name="$(var n)"/></launch>')
     include = f'<include file="{inner}"><arg name="n" value="given"/></include>'
     assert [node.name for node in launch(include + '<node pkg="p" exec="e" name="$(var n)"/>')] == ['given', 'given']
+    (launch.folder / 'middle.launch.xml').write_text(f'<launch><include file="{inner}"/></launch>')
+    assert [node.name for node in launch(include.replace('inner', 'middle'))] == ['given']
 
 
 def test_params_are_typed_and_kept_in_their_order_with_files(launch) -> None:

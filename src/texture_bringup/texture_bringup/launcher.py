@@ -617,13 +617,14 @@ class _Reader:
 
     def _read_include(self, element: Element) -> None:
         path = Path(self.text(element, 'file'))
-        known = _declared(_root(path))
         given = {self.text(item, 'name'): self.text(item, 'value') for item in element}
-        for name in given:
-            if name not in known:
-                raise unknown_name(name, known, f'argument of {path.name}')
+        others, self.declared = self.declared, set()
         self._variables.update(given)
         self.read_file(path)
+        for name in given:
+            if name not in self.declared:  # neither by this file nor by one that it includes
+                raise unknown_name(name, self.declared, f'argument of {path.name}')
+        self.declared |= others
 
     def _read_node(self, element: Element) -> None:
         texts = {name: self.text(element, name) for name in element.attrib}

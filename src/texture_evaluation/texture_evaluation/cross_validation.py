@@ -679,7 +679,7 @@ def cross_validate(
         delayed(_fold)(recipe, trained.of_slides(train), tested.of_slides(test), train, name)
         for train, test, name in named
     )
-    folds = list(progress(done, f"cross-validate '{recipe.name}', folds", len(named)))
+    folds = list(progress(done, f"cross-validating '{recipe.name}', folds", len(named)))
     usable = set(tested.groups.tolist())
     # What is certain of the shift: the condition that was left out, and the bags.
     left_out = SHIFTS.get(groups, '') if isinstance(groups, str) else 'other group'

@@ -47,7 +47,7 @@ def train_from_bags(
     plan = load_recipe(recipe)
     dataset = SlideDataset.from_bags(bags, slides, topics=plan.feature_set.topics)
     examples = training_examples(plan, dataset)
-    with task(f"fit '{plan.name}' to {len(examples.y)} windows"):
+    with task(f"fitting '{plan.name}' to {len(examples.y)} windows"):
         model = train(plan, examples, _name(out, plan.name))
     faults = dataset.tare_faults(plan.feature_set)
     most = max(
@@ -76,7 +76,7 @@ def train_grades_from_bags(
     plan, table = load_roughness_recipe(recipe), read_grades(grades)
     windows = replace(plan.feature_set, windows=plan.training_windows)
     examples = SlideDataset.from_bags(bags, slides, topics=windows.topics).features(windows)
-    with task(f"fit '{plan.name}' to {len(examples.y)} windows"):
+    with task(f"fitting '{plan.name}' to {len(examples.y)} windows"):
         model = train_grades(plan, examples, table, _name(out, plan.name))
     if out is not None:
         _save(model, out, bags, slides, grades=str(grades))

@@ -353,7 +353,7 @@ class SlideDataset:
         ModelMismatch
             If a slide has nothing of an input.
         """
-        for slide in progress(self.slides, 'compute features of slides', len(self)):
+        for slide in progress(self.slides, 'computing features of slides', len(self)):
             yield slide, cut_slide(slide, feature_set)
 
     def vectors(self, feature_set: FeatureSet) -> Iterator[tuple[LabelledSlide, list[FeatureVector]]]:

@@ -67,7 +67,7 @@ class PublicSet:
             if self.dated:
                 chosen.sort(key=lambda slide: str(slide[1][0]))
             bags = opened.enter_context(SlideBags(out))
-            for surface, order, file, key in progress(chosen, 'import slides', len(chosen)):
+            for surface, order, file, key in progress(chosen, 'importing slides', len(chosen)):
                 with _reading(file, OSError):
                     recording = self.slide(surface, order, contents[file], key)
                 with _reading(file):

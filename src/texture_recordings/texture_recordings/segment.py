@@ -32,7 +32,7 @@ def segment_bags(
     paths = find_bags(bags)
     return {
         Path(out) / path.name: _segment(path, Path(out) / path.name, params, surface, namespace)
-        for path in progress(paths, 'segment bags', len(paths))
+        for path in progress(paths, 'segmenting bags', len(paths))
     }
 
 

@@ -240,7 +240,7 @@ def find_slides(
     wanted = parse_selection(slides)
     paths = find_bags(bags)
     labelled = []
-    for path in progress(paths, 'read bags', len(paths)):
+    for path in progress(paths, 'reading bags', len(paths)):
         slides_of_bag = _slides_of(path, namespace, topics)
         if not slides_of_bag and len(paths) > 1:
             logging.getLogger(__name__).warning("the bag '%s' has no labelled slide, so nothing is taken from it", path)

@@ -171,7 +171,7 @@ def import_tables(
     """
     report = ImportReport()
     with SlideBags(out) as bags:
-        for path, place, fields in progress(_files(mapping, Path(source), kinds, report), 'import files'):
+        for path, place, fields in progress(_files(mapping, Path(source), kinds, report), 'importing files'):
             for frame in frames(path, place, mapping):
                 with placed(frame.place):
                     for session, states, streams in FrameSlides(mapping, _with_fields(frame, fields), report).slides():

@@ -46,7 +46,7 @@ forget_touches = trigger('restart the touches of the surface calibration', 'expl
 tare = trigger(
     'tare a sensor that nothing touches',
     'sensor/tare',
-    'start a sensor, such as the emulated one with `texture launch emulator`, or give its --namespace',
+    "start a driver of this suite, or give its --namespace; tare a mapped sensor by its vendor's driver",
 )
 
 # --------------------

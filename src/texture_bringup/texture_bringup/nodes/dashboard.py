@@ -116,7 +116,9 @@ class DashboardNode(Node):
 
     async def tare(self, _asked: Mapping[str, Any]) -> Mapping[str, Any]:
         """Take the present level of the sensor as that without load."""
-        return await self._call('sensor/tare', 'start a sensor')
+        return await self._call(
+            'sensor/tare', "start a driver of this suite; tare a mapped sensor by its vendor's driver"
+        )
 
     async def recover(self, _asked: Mapping[str, Any]) -> Mapping[str, Any]:
         """Free the arm from a fault."""

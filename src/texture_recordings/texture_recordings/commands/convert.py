@@ -90,7 +90,7 @@ def _configure_export(parser: argparse.ArgumentParser) -> None:
 def _export(options: argparse.Namespace) -> int:
     """Write slides as Parquet."""
     dataset = SlideDataset.from_bags(options.bags, options.slides, options.namespace)
-    with task(f"write '{options.out}'"):
+    with task(f"writing '{options.out}'"):
         lines = export_slides(dataset, options.out)
     print('\n'.join(lines))
     return 0
