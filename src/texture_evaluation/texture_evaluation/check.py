@@ -127,7 +127,7 @@ def check_finger(
         return True, _claim(found) + ('; its correction is removed' if correction is not None else '')
     sentence = f'the finger is not as trained: {"; ".join(faults)}'
     if not correct:
-        return False, f'{sentence}. Clean or replace the skin, or correct the model by --correct'
+        return False, f'{sentence}. Check that this is the reference plate; clean or replace the skin, or use --correct'
     write_json(Correction.of(found).as_mapping(), path)
     return False, f"{sentence}. The model is corrected, '{path}': start the nodes again with its model card as recipe"
 
