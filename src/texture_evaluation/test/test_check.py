@@ -53,7 +53,7 @@ def test_a_finger_is_checked_corrected_and_found_as_trained_again(trained):
     as_trained, sentence = check(model, louder(slides[2], 2.0))
     assert not as_trained
     assert 'the gain changed by +6.' in sentence or 'the gain changed by +5.' in sentence
-    assert sentence.endswith('correct the model by --correct')
+    assert sentence.endswith('Check that this is the reference plate; clean or replace the skin, or use --correct')
 
     _, sentence = check(model, louder(slides[2], 2.0), correct=True)
     assert 'start the nodes again with its model card as recipe' in sentence
