@@ -342,7 +342,8 @@ def test_the_table_has_a_row_for_each_fold_and_the_file_all_figures(tmp_path: Pa
     write_json(result.as_json(), tmp_path / 'figures.json')
     written = json.loads((tmp_path / 'figures.json').read_text())
     assert written == result.as_json()
-    assert written['folds'][0]['slides']['cork/1'] == 'cork'
+    end = result.folds[0].results['cork/1'].end
+    assert written['folds'][0]['slides']['cork/1'] == {'label': 'cork', 'rejection': end.rejection.name.lower()}
     assert written['feature_set'] == result.folds[0].model.feature_set
     assert written['version'] == version('texture_evaluation')
     with pytest.raises(InvalidParameter, match='cannot be written'):

@@ -291,7 +291,7 @@ class CrossValidation:
         return found
 
     def as_json(self) -> dict[str, Any]:
-        """Return the pooled figures, those of each fold, all with 95 % intervals, and the label of each test slide.
+        """Return the pooled figures, those of each fold, all with 95 % intervals, and the estimate of each test slide.
 
         `feature_set` is the fingerprint of the features, as in the card of a model, and `version` that of the suite.
         """
@@ -310,7 +310,10 @@ class CrossValidation:
                     'name': fold.name,
                     'trained_on': list(fold.trained_on),
                     **self.figures([fold]),
-                    'slides': {name: result.estimates[-1].label for name, result in fold.results.items()},
+                    'slides': {
+                        name: {'label': result.end.label, 'rejection': result.end.rejection.name.lower()}
+                        for name, result in fold.results.items()
+                    },
                 }
                 for fold in self.folds
             ],
