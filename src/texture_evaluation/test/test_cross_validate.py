@@ -407,7 +407,7 @@ def test_progress_counts_the_folds(monkeypatch: pytest.MonkeyPatch) -> None:
         'texture_evaluation.cross_validation.progress', lambda done, *what: seen.append(what) or list(done)
     )
     result = cross_validate(RECIPE, tones(), LeaveOneGroupOut(), groups='speed')
-    assert seen == [(f"cross-validate '{RECIPE.name}', folds", len(result.folds))]
+    assert seen == [(f"cross-validating '{RECIPE.name}', folds", len(result.folds))]
 
 
 def test_axes_end_at_100_percent_and_lines_that_coincide_are_both_seen(monkeypatch: pytest.MonkeyPatch) -> None:
