@@ -16,6 +16,7 @@ from urllib.request import urlopen
 import pytest
 
 from texture_bringup import demo
+from texture_bringup.command import main
 from texture_bringup.demo import (
     ACCEPTED,
     ATTEMPTS,
@@ -163,3 +164,11 @@ def test_a_domain_in_use_is_left_alone() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as participant:
         participant.bind(('', FIRST_PORT + PORTS_PER_DOMAIN * first + FIRST_UNICAST))
         assert free_domain() != first
+
+
+def test_a_folder_of_other_files_is_refused_and_left_as_it_is(tmp_path, capsys) -> None:
+    (tmp_path / 'training').mkdir()
+    (tmp_path / 'training' / 'notes.txt').write_text('mine')
+    assert main(['demo', '--out', str(tmp_path)]) == 2
+    assert 'holds files that no demonstration wrote' in capsys.readouterr().err
+    assert (tmp_path / 'training' / 'notes.txt').read_text() == 'mine'

@@ -16,7 +16,7 @@ from texture_bringup.launcher import (
     typed,
 )
 from texture_core import cli
-from texture_core.errors import InvalidData, InvalidLaunch, UnknownName
+from texture_core.errors import InvalidData, InvalidLaunch, InvalidParameter, UnknownName
 from texture_drivers.catalogue import SENSORS
 from texture_simulation.emulator import LIVE_SENSORS
 
@@ -178,6 +178,12 @@ def test_an_unknown_package_or_executable_gets_the_nearest(launch, tmp_path) -> 
 )
 def test_a_namespace_is_joined_unless_it_is_absolute(base, name, joined) -> None:
     assert joined_namespace(base, name) == joined
+
+
+@pytest.mark.parametrize('name', ['le ft', '9left', 'left/9', 'a//b', 'lëft', 'a-b'])
+def test_a_namespace_that_ros_would_refuse_is_refused_with_what_is_allowed(launch, name) -> None:
+    with pytest.raises(InvalidParameter, match='letters, digits and _'):
+        launch(f'<push_ros_namespace namespace="{name}"/>')
 
 
 @pytest.mark.parametrize(

@@ -152,11 +152,14 @@ def _clear(folder: Path) -> None:
     """Make the folder; remove what an earlier demonstration has left there, and nothing else."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        if any(folder.iterdir()) and not (folder / LOG).exists():
+            raise InvalidData(f"'{folder}' holds files that no demonstration wrote; name another folder with --out")
         for left in (TRAINING, f'{MODEL}.added'):
             shutil.rmtree(folder / left, ignore_errors=True)
         models = (f'{name}{ending}' for name in (MODEL, ROUGHNESS) for ending in ('.npz', '.json'))
         for file in (PICTURE, LOG, GRADES, *models):
             (folder / file).unlink(missing_ok=True)
+        (folder / LOG).touch()  # marks the folder from the beginning
     except OSError as error:
         raise InvalidData(f"'{folder}' cannot be used: {error.strerror}; name another with --out") from error
 

@@ -34,6 +34,7 @@ from texture_core.config import (
     parse_yaml,
     prefix,
     read_bounded,
+    ros_namespace,
     unknown_name,
     yaml_text,
 )
@@ -493,7 +494,7 @@ def read(path: Path, given: Mapping[str, str], environment: Mapping[str, str]) -
 
 def joined_namespace(base: str, name: str) -> str:
     """Return an absolute namespace, `name` below `base` unless it is absolute itself; '' if both are ''."""
-    joined = name if name.startswith('/') or not (base or name) else f'{base}/{name}'
+    joined = name if ros_namespace(name).startswith('/') or not (base or name) else f'{base}/{name}'
     return '/' + joined.strip('/') if joined else ''
 
 

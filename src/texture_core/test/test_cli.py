@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from texture_core import cli
-from texture_core.cli import Parser, core_count
+from texture_core.cli import Parser, add_namespace, core_count
 from texture_core.errors import TextureError
 
 
@@ -53,6 +53,7 @@ def test_a_stop_while_a_node_imports_ends_it_with_0_and_without_a_traceback(numb
         (['oak', '--jobs', '0'], "--jobs is '0'; 0 cores compute nothing; 1 or more are needed, or -1 for all"),
         (['oak', '--kind', 'liner'], "no value of --kind 'liner'; did you mean 'linear'? Known: circular, linear"),
         (['oak', '--speed'], '--speed: expected one argument; write touch [-h] [--speed M/S]'),
+        (['oak', '--namespace', 'le ft'], "the namespace is 'le ft'; allowed are letters, digits and _"),
         (['oak', 'elm'], "'elm' is one argument too many; write touch [-h] [--speed M/S]"),
         ([], 'the following arguments are required: surface; write touch [-h] [--speed M/S]'),
     ],
@@ -62,6 +63,7 @@ def test_a_mistake_in_an_option_is_answered_with_what_came_and_what_is_allowed(g
     parser.add_argument('surface')
     parser.add_argument('--speed', type=float, metavar='M/S', help='speed, 5 %% at least')
     parser.add_argument('--jobs', type=core_count)
+    add_namespace(parser)
     parser.add_argument('--kind', choices=('linear', 'circular'))
     with pytest.raises(TextureError) as refused:
         parser.parse_args(given)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NoReturn, TypeVar
 
-from texture_core.config import from_mapping, parameters_of, unknown_name
+from texture_core.config import from_mapping, parameters_of, ros_namespace, unknown_name
 from texture_core.errors import InvalidParameter, TextureError
 
 T = TypeVar('T')
@@ -74,7 +74,7 @@ class Parser(argparse.ArgumentParser):
 
 def add_namespace(parser: argparse.ArgumentParser) -> None:
     """Add `--namespace`."""
-    parser.add_argument('--namespace', default='', metavar='NS', help='namespace of the nodes')
+    parser.add_argument('--namespace', default='', type=ros_namespace, metavar='NS', help='namespace of the nodes')
 
 
 def add_slides(parser: argparse.ArgumentParser) -> None:

@@ -13,6 +13,7 @@ import json
 import lzma
 import math
 import os
+import re
 import stat
 import sys
 import tokenize
@@ -352,6 +353,15 @@ def refuse_inputs(outputs: Sequence[str | Path | None], inputs: Sequence[str | P
 
 def _real(path: str | Path) -> Path:
     return Path(path).expanduser().resolve()
+
+
+def ros_namespace(text: str) -> str:
+    """Return a namespace of ROS as it was given; InvalidParameter if it cannot be one."""
+    if not re.fullmatch(r'/?([A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?/?', text):
+        raise InvalidParameter(
+            f"the namespace is '{text}'; allowed are letters, digits and _, with / between names, no digit first"
+        )
+    return text
 
 
 # --------------------
