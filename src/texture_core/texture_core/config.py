@@ -344,11 +344,13 @@ class Arrays:
 
 
 def refuse_inputs(outputs: Sequence[str | Path | None], inputs: Sequence[str | Path]) -> None:
-    """Refuse to write over a file that is read."""
+    """Refuse to write over a file that is read, or into a folder that does not exist."""
     read = {_real(given) for given in inputs}
     for output in outputs:
         if output and _real(output) in read:
             raise InvalidParameter(f"'{output}' would overwrite a file that is read; name another file")
+        if output and not _real(output).parent.is_dir():
+            raise InvalidParameter(f"'{output}' cannot be written: its folder does not exist; make it, or name another")
 
 
 def _real(path: str | Path) -> Path:

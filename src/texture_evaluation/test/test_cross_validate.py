@@ -16,7 +16,7 @@ from scipy.stats import beta
 from sklearn.model_selection import GroupShuffleSplit, LeaveOneGroupOut, PredefinedSplit, StratifiedGroupKFold
 
 from texture_core.config import write_json
-from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch
 from texture_core.types import TextureEstimate
 from texture_estimation.recipe import Recipe
 from texture_evaluation.commands import evaluate
@@ -95,6 +95,17 @@ def test_tones_are_distinguished_in_every_fold() -> None:
     assert figures['n_slides'] == 24
     # The chance that 24 of 24 slides are right is 5 % at the lower edge.
     assert figures['window_accuracy_interval'] == [pytest.approx(0.05 ** (1 / 24)), 1.0]
+
+
+def test_slides_of_two_rates_are_refused_with_the_first_that_differs() -> None:
+    samples = [np.random.default_rng(0).normal(size=(n, 1)) for n in (1000, 2000)]
+    one, other = (
+        SlideDataset.from_arrays({'signal': [each]}, ['oak'], {'signal': float(len(each))}, speed_m_s=0.05, force_n=1.0)
+        for each in samples
+    )
+    slides = SlideDataset((*one.slides, replace(other.slides[0], number=2, bag=Path('fast'))))
+    with pytest.raises(ModelMismatch, match=r"'oak/2' in 'fast' has signal=2000Hz\*1, .* signal=1000Hz\*1"):
+        slides.features(RECIPE.feature_set)
 
 
 @pytest.mark.parametrize('n', [1, 4, 20, 100])

@@ -151,6 +151,8 @@ def test_files_that_are_read_are_not_overwritten_and_another_may_be(
     for model in ('m1', 'm1.npz', 'm1.json'):
         with pytest.raises(InvalidParameter, match='would overwrite'):
             refuse_inputs([output], [*both_files(model), 'own.yaml'])
+    with pytest.raises(InvalidParameter, match='its folder does not exist'):
+        refuse_inputs(['nowhere/figures.json'], [])
     refuse_inputs(['figures.json', None], [*both_files('m1'), 'own.yaml', tmp_path / 'bags'])
 
 

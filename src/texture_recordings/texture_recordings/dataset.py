@@ -403,7 +403,14 @@ class SlideDataset:
         vectors: list[FeatureVector] = []
         resized: list[FeatureVector] = []
         for slide, events in self.windows(feature_set):
-            vectors += _described(slide, feature_set, events)
+            described = _described(slide, feature_set, events)
+            kinds = [one.feature_set.partition(' ')[2] for one in (*vectors[:1], *described[:1])]
+            if len(set(kinds)) > 1:
+                raise ModelMismatch(
+                    f"slide '{slide.name}' in '{slide.bag}' has {kinds[1]}, and those before it {kinds[0]} (rate × "
+                    "channels); use slides of one kind, and where a driver measures the rate, set 'rate_hz'"
+                )
+            vectors += described
             resized += feature_set.extract_many(_windows_over(slide, feature_set, distances_m))
             if augmenter is not None:
                 augmenter.add(slide.name, events, slide.signals, slide.states)
