@@ -63,7 +63,7 @@ def run_incremental(
     for stage, before in zip(stages, (0, *stages), strict=False):
         for number, label in itertools.product(range(before + 1, stage + 1), new):
             [slide] = set(examples.groups[(numbers == number) & (examples.labels == label)].tolist())
-            for vector in examples.vectors(slide)[:-1]:  # the last one is the end
+            for vector in examples.vectors(slide):
                 incremental.observe(vector)
             began_s = time.process_time()
             incremental.add(label, slide)

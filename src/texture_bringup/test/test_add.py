@@ -57,7 +57,10 @@ def test_a_texture_is_added_and_removed_from_the_command_line(graph, asked, caps
     assert classify_slide(graph, 'slide-1') in ('cork', 'felt', '')
     assert asked(graph, 'add', 'silk') == 0
     printed = capsys.readouterr().out
-    assert "added 'silk' from 'slide-1'; 3 textures, 1 slide added since the training; 'silk' has 8 windows" in printed
+    assert (
+        "added 'silk', a new texture, from 'slide-1'; 3 textures, 1 slide added since the training; "
+        "'silk' has 8 windows" in printed
+    )
     assert asked(graph, 'add', 'silk') == 2
     assert "'slide-1' was added as 'silk' already" in capsys.readouterr().err
     assert classify_slide(graph, 'slide-2') == 'silk'

@@ -122,6 +122,19 @@ def test_a_model_saved_again_keeps_its_added_slides_but_not_those_of_other_featu
         load_model(path)
 
 
+def test_a_slide_is_added_once_it_has_ended_and_no_earlier_one_in_its_place(model, silk, measured, slide_of):
+    classifier = IncrementalClassifier(model)
+    measured(classifier, silk, 'first')
+    *windows, end = slide_of(model, silk, 'second')
+    for vector in windows:
+        classifier.observe(vector)
+    with pytest.raises(InvalidData, match="'second' still runs"):
+        classifier.add('silk')
+    classifier.observe(end)
+    classifier.add('silk')
+    assert [slide.exploration_id for slide in classifier.model.added_slides] == ['second']
+
+
 def test_what_cannot_be_trained_is_refused_with_a_sentence(model, silk, measured):
     classifier = IncrementalClassifier(model)
     with pytest.raises(InvalidData, match='no exploration was classified with this model; explore first'):
@@ -175,6 +188,7 @@ def test_an_added_slide_widens_the_domain_until_it_is_removed_also_after_a_resta
     classifier = IncrementalClassifier(load_model(path), path)
     for row in silk:
         classifier.observe(FeatureVector(0, 'e1', 0.5, 0.1, model.names, row, 0.1, feature_set=model.feature_set))
+    classifier.observe(FeatureVector(0, 'e1', 0.0, 0.1, last=True))
     fast = SlideConditions('linear_slide', speed_m_s=0.1)
     assert classifier.model.active_acceptance.domain.deviation(fast)
     classifier.add('silk')

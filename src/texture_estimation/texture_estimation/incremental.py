@@ -57,6 +57,7 @@ class IncrementalClassifier:
         self._numbers = stored_numbers(path) if path is not None else []  # of the files, one for each added slide
         self._recent_windows: OrderedDict[str, list[Array]] = OrderedDict()
         self._conditions: dict[str, RunningConditions] = {}  # of the same explorations
+        self._sliding: str | None = None  # the exploration whose end has not come
 
     def begin(self, exploration_id: str) -> None:
         """Note an exploration as the newest one: if it ends before it slides, no earlier one takes its place."""
@@ -65,6 +66,7 @@ class IncrementalClassifier:
     def observe(self, vector: FeatureVector) -> None:
         """Keep a window, so that its exploration can be added."""
         windows = self._recent_windows_of(vector.exploration_id)
+        self._sliding = None if vector.last else vector.exploration_id
         if vector.last or vector.feature_set != self.model.feature_set or not np.isfinite(vector.values).all():
             return
         windows.append(vector.values)
@@ -77,6 +79,8 @@ class IncrementalClassifier:
         if not label:
             raise ChangeRefused('no label was given; name the texture to add', ChangeError.INVALID_LABEL)
         name = exploration_id or next(reversed(self._recent_windows), '')
+        if name == self._sliding:
+            raise ChangeRefused(f"exploration '{name}' still runs; add it once it has ended", ChangeError.NO_SLIDE)
         self._refuse_without_window(name)
         self._refuse_second_time(name, label)
         added_slide = AddedSlide(label, name, np.stack(self._recent_windows[name]), self._conditions[name].get())

@@ -313,6 +313,7 @@ def test_one_added_slide_moves_the_planes_themselves_and_is_taken_back(make_exam
     for number, values in enumerate(np.split(rows, 4)):  # four slides
         for row in values:
             online.observe(FeatureVector(0, f'{number}', 0.5, 0.25, model.names, row, feature_set=model.feature_set))
+        online.observe(FeatureVector(0, f'{number}', 0.0, 0.25, last=True))
         online.add('wood', f'{number}')
     planes = np.vstack((model.parameters['planes'], np.zeros(7)))
     standard = (rows - model.parameters['mean']) / model.parameters['scale']

@@ -119,7 +119,9 @@ def _info(options: argparse.Namespace) -> int:
 
     path = Path(options.path)
     # A model is one of two files with the same name; everything else is read as a bag, whose errors are reported.
-    if not path.is_dir() and (path.suffix in ('.npz', '.json') or path.with_name(f'{path.name}.npz').is_file()):
+    endings = ('.npz', '.json')
+    half = any(path.with_name(f'{path.name}{ending}').is_file() for ending in endings)
+    if not path.is_dir() and (half or path.suffix in endings):
         print('\n'.join(_model_lines(path)))
         return 0
     for bag in bags_in(path):

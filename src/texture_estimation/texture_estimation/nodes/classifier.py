@@ -189,15 +189,16 @@ class Classifier(EstimatorNode):
         return {'refused_vectors': self._evidence.refused, 'not_finite_vectors': self._evidence.not_finite}
 
     def _on_add(self, request: srv.AddTexture.Request, answer: srv.AddTexture.Response) -> Any:
+        known = self._evidence.model.labels if self._evidence.model else ()
         try:
             answer.examples = self._require_incremental().add(request.label, request.exploration_id)
         except (TextureError, OSError) as error:
             return _refused(answer, error)
         model = self._use_updated_model()
         answer.error_code = srv.AddTexture.Response.ERROR_NONE
-        answer.message = f"added '{request.label.strip()}' from '{model.added_slides[-1].exploration_id}'; " + _known(
-            model
-        )
+        added_slide = model.added_slides[-1]
+        new = ', a new texture,' * (added_slide.label not in known)
+        answer.message = f"added '{added_slide.label}'{new} from '{added_slide.exploration_id}'; {_known(model)}"
         return answer
 
     def _on_remove_last(self, _: Trigger.Request, answer: Trigger.Response) -> Any:
