@@ -97,6 +97,9 @@ def _launch_file(path: Path) -> str:
     for argument in ElementTree.fromstring(text).findall('arg'):
         default = argument.get('default')
         shown = 'required' if default is None else f'`{default}`' if default else 'empty'
+        # One that is declared twice has a default with another argument, and one without it.
+        when = re.search(r'var (\w+)', argument.get('if') or argument.get('unless') or '')
+        shown += f', {"with" if argument.get("if") else "without"} `{when[1]}`' if when else ''
         rows.append(f'| `{argument.get("name")}` | {shown} | {argument.get("description")} |')
     return f'## {name}\n\n{" ".join(about.split())}\n\n' + '\n'.join(rows) + '\n'
 

@@ -19,7 +19,7 @@ PAGES = sorted(
     [*ROOT.glob('*.md'), *ROOT.glob('docs/*.md'), *ROOT.glob('docs/reference/*.md'), *ROOT.glob('src/*/*.md')]
 )
 LINK = re.compile(r'\]\(([^)\s]+)\)')
-REPOSITORY = re.search(r'^repository: (.+)$', (ROOT / 'docs' / 'deployment.md').read_text(), re.MULTILINE)[1]
+REPOSITORY = re.search(r'^repository: (.+)$', (ROOT / 'CONTRIBUTING.md').read_text(), re.MULTILINE)[1]
 HEADING = re.compile(r'^#+ (.+)$', re.MULTILINE)
 
 

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Launch files, configuration, the `texture` command, the dashboard and the demonstration.
 
-Data in: arguments of launch files and commands. Data out: running nodes, sentences for people, and exit codes: 0 for
-success, 2 if an argument is wrong or something is missing, 1 for a bad outcome such as an aborted exploration.
+Data in: arguments of launch files and commands. Data out: running nodes, sentences for people, and exit codes, which
+are on the page of the commands (`docs/reference/commands.md`).
 
 .. code-block:: sh
 

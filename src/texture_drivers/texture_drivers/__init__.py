@@ -16,5 +16,5 @@ the unit of the sensor, in batches of 5 to 20 ms; every lost sample is counted.
 
 With ROS: `ros2 run texture_drivers sensor --ros-args -p sensor:=tsf85 -p device:=auto`
 
-Limits: no driver has been tested with a real device. Wiring and protocols: `docs/sensors.md`.
+Limits: nothing here has run on real hardware yet. Wiring and protocols: `docs/sensors.md`.
 """

@@ -21,6 +21,6 @@ is the state of the finger and the time for which speed and force are guaranteed
 
 With ROS: `ros2 run texture_exploration explorer --ros-args -p arm:=simulated`
 
-Limits: no arm has been tested on a real robot, and nothing here is a safety function: `docs/safety.md`.
+Limits: nothing here has run on real hardware yet, and nothing is a safety function: `docs/safety.md`.
 Arm and sensor are fixed when the node starts; other parameters change with the next exploration.
 """

@@ -99,7 +99,7 @@ TINY = 1e-12
 
 @dataclass(frozen=True)
 class SvmMaxWins:
-    """The first principal components that explain most of the variance, and RBF machines for all pairs of labels.
+    """The first principal components that explain most of the variance, and RBF SVMs for all pairs of labels.
 
     The mean of each example over its features is subtracted (eq. 7). The machines are scikit-learn's `SVC` with its
     usual kernel width, gamma = 1 / (n_components · variance). The label that wins most pairs is taken; ties are broken

@@ -172,7 +172,7 @@ ITERATIONS = 100_000  # of libsvm: a pair that cannot be separated need not be f
 
 @dataclass(frozen=True)
 class SvmLinear:
-    """Linear machines for all pairs; most pairs won, ties broken by the clearer decisions.
+    """Linear SVMs for all pairs; most pairs won, ties broken by the clearer decisions.
 
     A pipeline of scikit-learn with the penalty C that is best by repeated stratified cross-validation, the smallest of
     those that tie. A label with fewer slides than there are folds is not held out: then C is the middle one.

@@ -157,7 +157,7 @@ class Ann5(Ann1):
 
 @dataclass(frozen=True)
 class Svm5:
-    """An RBF machine per grade that answers yes or no; the grade is the mean of those that fire, none if none does.
+    """An RBF SVM per grade that answers yes or no; the grade is the mean of those that fire, none if none does.
 
     Source: Rispal et al., "Texture roughness estimation using dynamic tactile sensing", section IV.C.
     """

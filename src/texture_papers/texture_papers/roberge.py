@@ -418,7 +418,7 @@ def pairs_of_machine(parameters: Mapping[str, Any]) -> PairsPredictor:
 
 @dataclass(frozen=True)
 class SvmPairs:
-    """RBF machines for all pairs with one box constraint and kernel scale; most pairs won.
+    """RBF SVMs for all pairs with one box constraint and kernel scale; most pairs won.
 
     A pipeline of scikit-learn: `StandardScaler`, which is ours, and `SVC` with `exp(-|x - s|² / kernel_scale²)`,
     MATLAB's sense of the scale: gamma = 1 / kernel_scale².

@@ -64,7 +64,7 @@ SALT = 41  # so that the gain of a finger is drawn independently of its other tr
 
 @dataclass(frozen=True)
 class FingerSpread:
-    """Each individual of the sensor has an individual sensitivity to textures."""
+    """Each specimen of the sensor has another sensitivity to textures."""
 
     relative: float = param(0.1, 'Relative spread of the sensitivity from finger to finger.', low=0.0, high=0.5)
     skin: float = param(

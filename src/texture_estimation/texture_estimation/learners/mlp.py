@@ -167,7 +167,7 @@ TEMPERED = ('output', 'output_offset')
 
 @dataclass(frozen=True)
 class Mlp:
-    """Standardised features, one layer of rectifiers, softmax; probabilities calibrated on slides held out.
+    """Standardised features, one ReLU layer, softmax; probabilities calibrated on held-out slides.
 
     As accurate on recorded slides as an RBF support vector machine, at a cost that does not grow with the examples and
     hardly with the labels. Noise on the standardised inputs takes the place of an early stop (Bishop 1995).

@@ -355,7 +355,7 @@ POLL_S = 0.01
 
 
 class UrArm(SurfaceArm):
-    """A Universal Robots e-Series through ur-rtde. No method waits for the controller longer than declared.
+    """A Universal Robots e-Series through ur-rtde; each wait for the controller has a timeout.
 
     Parameters
     ----------
