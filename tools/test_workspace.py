@@ -98,12 +98,19 @@ def test_a_second_set_up_does_nothing_and_another_python_makes_the_environment_a
     assert made == [(3, 12), (3, 13)]
 
 
-def test_a_long_step_gives_signs_of_life(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_long_step_says_which_it_is_and_how_long_it_has_lasted(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.setattr(workspace, 'SIGN_S', 0.1)
-    workspace.run(sys.executable, '-c', 'import time; time.sleep(0.5)')
-    assert 'set-up: still at work after 0 min' in capfd.readouterr().out
+    step = workspace.Step(3)
+    step.run(sys.executable, '-c', 'import time; time.sleep(0.5)')
+    named = 'set-up: [3 of 4] building texture_msgs, the longest step'
+    said = capfd.readouterr().out.splitlines()
+    assert said[0] == named
+    assert said[1:]
+    assert set(said[1:]) == {f'{named}, 0 min so far'}
     with pytest.raises(workspace.SetupError, match='this command failed'):
-        workspace.run(sys.executable, '-c', 'raise SystemExit(3)')
+        step.run(sys.executable, '-c', 'raise SystemExit(3)')
 
 
 def test_each_file_of_the_lock_has_its_hash() -> None:

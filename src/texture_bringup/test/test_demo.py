@@ -2,18 +2,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """The demonstration, shortened; what it prints is tested where it is made."""
 
+import os
 import re
+import shlex
 import signal
 import socket
 import subprocess
 import sys
 import time
+from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
 from urllib.error import URLError
 from urllib.request import urlopen
 
 import pytest
+from matplotlib.figure import Figure
 
 from texture_bringup import demo
 from texture_bringup.command import main
@@ -25,13 +29,15 @@ from texture_bringup.demo import (
     PORTS_PER_DOMAIN,
     UNKNOWN,
     Slide,
+    by_hand,
     free_domain,
     slide_over,
 )
+from texture_bringup.launcher import find_launch_file, given_arguments, read
 from texture_bringup.operator import ExplorationResult
 from texture_core.errors import ExplorationError
 from texture_core.ros_testing import killed_on_error
-from texture_core.types import ExplorationRequest, Rejection, RoughnessEstimate, TextureEstimate
+from texture_core.types import ExplorationRequest, FingerReceiver, Rejection, RoughnessEstimate, TextureEstimate
 
 pytestmark = pytest.mark.realtime
 
@@ -68,6 +74,23 @@ def test_an_answer_is_as_expected_if_label_and_rejection_are(
     estimate = TextureEstimate(0, 'a', label, rejection)
     answer = ExplorationResult(ExplorationError.NONE, '', 'a', estimate, RoughnessEstimate(0, 'a'))
     assert Slide('glass', 'glass', expected, answer, []).as_expected is as_expected
+
+
+def test_the_picture_has_no_line_before_the_first_estimate_and_times_below_each_panel(tmp_path, monkeypatch) -> None:
+    figure = Figure()
+    monkeypatch.setattr(demo, 'chart', lambda *_: nullcontext(figure))
+    seen = [
+        TextureEstimate(0, 'a', 'glass', Rejection.NONE, probabilities=(0.9, 0.1), evidence_s=seconds)
+        for seconds in (0.5, 0.6)
+    ]
+    answer = ExplorationResult(ExplorationError.NONE, '', 'a', seen[-1], RoughnessEstimate(0, 'a'))
+    slide = Slide(
+        'glass', 'glass', ACCEPTED, answer, [TextureEstimate(0, 'a', '', Rejection.TOO_LITTLE_EVIDENCE), *seen]
+    )
+    demo.draw([slide] * 3, tmp_path / 'demo.png')
+    panels = figure.axes[:3]
+    assert [[min(line.get_xdata()) for line in panel.lines] for panel in panels] == [[0.5, 0.5]] * 3
+    assert all(panel.xaxis.get_tick_params()['labelbottom'] for panel in panels)
 
 
 def page_at(address: str) -> bytes:
@@ -111,13 +134,15 @@ def test_an_aborted_slide_and_a_rejected_one_over_a_trained_surface_are_made_aga
     request = ExplorationRequest('linear_slide', surface='felt')
     slide = slide_over(operator, request, 'felt', expected)
     assert (slide.answer.exploration_id, list(made)) == (last, [])
-    assert capsys.readouterr().out.count('trying again') == len(ends) - 1
+    assert capsys.readouterr().out.count('this try does not count, trying again') == len(ends) - 1
 
 
 @pytest.mark.ros
 def test_it_accepts_trained_surfaces_and_rejects_others_and_leaves_a_picture(tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.setattr(demo, 'RECOGNISED', ('glass', 'ridge_2mm_deep'))
     monkeypatch.setattr(demo, 'UNTRAINED', ('cardboard',))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv('XDG_RUNTIME_DIR', str(tmp_path))
     right = demo.demonstrate(tmp_path / 'demo', 'default', 0)
     said = capsys.readouterr().out
     assert right, said
@@ -130,6 +155,33 @@ def test_it_accepts_trained_surfaces_and_rejects_others_and_leaves_a_picture(tmp
     ):
         assert re.search(line, said), said
     assert (tmp_path / 'demo/demo.png').stat().st_size > 10_000
+    # The two lines at the end work as they are printed, also beside an emulator with the pipe of the default.
+    launch, explore = (line.split() for line in said.splitlines()[-2:])
+    other = FingerReceiver(str(tmp_path / 'tactile_texture/finger'))
+    with subprocess.Popen(launch, stdout=subprocess.PIPE, text=True) as launcher, killed_on_error(launcher):
+        assert any('the sensor delivers samples' in line for line in launcher.stdout)
+        explored = subprocess.run(explore, check=False, capture_output=True, text=True, timeout=DEADLINE_S)
+        launcher.send_signal(signal.SIGINT)
+        launcher.communicate(timeout=DEADLINE_S)
+    other.close()
+    assert re.search(r'texture: +leather, confidence', explored.stdout), explored
+
+
+def test_the_lines_for_the_user_name_recipe_and_page_only_where_they_are_not_the_default() -> None:
+    usual, explore = by_hand(Path('my out'), 'default', 0)
+    assert "'model:=my out/model.npz'" in usual
+    assert 'recipe:=' not in usual
+    assert 'dashboard' not in usual
+    assert '--namespace demo' in explore
+    nodes = read(find_launch_file('emulator'), given_arguments(shlex.split(usual)[3:]), os.environ)
+    assert {node.namespace for node in nodes} == {'/demo'}
+    other, _ = by_hand(Path('out'), 'vibration', 8123)
+    nodes = read(find_launch_file('emulator'), given_arguments(shlex.split(other)[3:]), os.environ)
+    given = {
+        node.name: {k: v for one in node.parameters if isinstance(one, dict) for k, v in one.items()} for node in nodes
+    }
+    assert given['dashboard']['port'] == 8123
+    assert given['feature_extractor']['recipe'] == 'out/model.json'
 
 
 @pytest.mark.ros
@@ -139,10 +191,8 @@ def test_it_serves_the_page_of_the_operator_and_ctrl_c_ends_it_cleanly_and_leave
         subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as demo,
         killed_on_error(demo),
     ):
-        for line in demo.stdout:
-            if 'dashboard: ' in line:
-                address = line.split()[1]
-                break
+        address = next(line.split()[1] for line in demo.stdout if 'dashboard: ' in line)  # before the training
+        assert any(f'the dashboard is at {address} now' in line for line in demo.stdout)
         deadline = time.monotonic() + DEADLINE_S
         while b'<html' not in page_at(address):  # the server is up a moment after its node
             assert time.monotonic() < deadline
@@ -152,7 +202,7 @@ def test_it_serves_the_page_of_the_operator_and_ctrl_c_ends_it_cleanly_and_leave
         _, said = demo.communicate(timeout=DEADLINE_S)
     assert demo.returncode == 130
     # A slow start has said what it waits for.
-    shown = r'((waiting:|waiting for|fitting|reading bags|computing features) [^\n]*\n)*'
+    shown = r'((waiting:|waiting for|training) [^\n]*\n)*'
     assert re.fullmatch(rf'{shown}texture: interrupted\n', said), said
     assert 'Traceback' not in said
     assert len(pids) == 8

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import shutil
 import socket
 import tempfile
@@ -19,6 +20,7 @@ import numpy as np
 from texture_bringup.feed import in_words
 from texture_bringup.launcher import ChildLauncher
 from texture_bringup.operator import ExplorationResult, Operator
+from texture_core.cli import task
 from texture_core.errors import ExplorationError, InvalidData, LaunchFailed
 from texture_core.types import ExplorationRequest, Rejection, TextureEstimate
 from texture_evaluation.charts import COLOURS, chart
@@ -171,6 +173,10 @@ ATTEMPTS = 3  # a machine that is busy with something else delays the emulated a
 def demonstrate(out: Path, recipe: str, seed: int, *, dashboard: bool = False) -> bool:
     """Train, recognise and reject on the emulator, and report; return whether every answer was as expected."""
     _clear(out)
+    port = _free_port() if dashboard else 0
+    address = f'http://127.0.0.1:{port}'
+    if dashboard:
+        line(f'dashboard: {address} from `Starting the emulator` to `Ending the nodes`')
     _train(out, recipe, seed)
     section('Starting the emulator: surfaces, arm and sensor are simulated, all other nodes are the real ones')
     with tempfile.TemporaryDirectory(prefix='texture_demo_') as name:
@@ -185,7 +191,7 @@ def demonstrate(out: Path, recipe: str, seed: int, *, dashboard: bool = False) -
             'seed': seed + 1,
         }
         if dashboard:
-            arguments |= {'dashboard': 'true', 'dashboard_port': _free_port()}
+            arguments |= {'dashboard': 'true', 'dashboard_port': port}
         domain_id = free_domain()
         environment = {
             **os.environ,
@@ -201,9 +207,18 @@ def demonstrate(out: Path, recipe: str, seed: int, *, dashboard: bool = False) -
             operator.wait_for_signal(START_DEADLINE_S)
             if dashboard:
                 operator.wait_for_node('dashboard', START_DEADLINE_S)
-                line(f'dashboard: http://127.0.0.1:{arguments["dashboard_port"]} while this runs')
+                line(f'the dashboard is at {address} now')
             slides = _explore(operator)
-    _report(slides, out)
+            section('Ending the nodes, then drawing the picture')
+    draw([slide for slide in slides if slide.expected], out / PICTURE)
+    right = sum(slide.as_expected for slide in slides)
+    section(f'Done: {right} of {len(slides)} results as expected. Look at {out / PICTURE}')
+    line(f'training slides, models and the log of the nodes are in {out}/')
+    line('by hand, in one terminal and, once it prints `the sensor delivers samples`, in another:')
+    for command in by_hand(out, recipe, port):
+        line(f'    {command}')
+    if dashboard:
+        line(f'the first of them serves the dashboard at {address} again')
     return all(slide.as_expected for slide in slides)
 
 
@@ -213,10 +228,12 @@ def _train(out: Path, recipe: str, seed: int) -> None:
     slides = SlidePlan(TRAINING_SLIDES, SPEED_M_S, FORCE_N, DISTANCE_M / SPEED_M_S)
     bags = write_simulated(out / TRAINING, slides, np.random.default_rng(seed), surfaces=tuple(TRAINED))
     section('Training a texture model and a roughness model (as `texture train` does)')
-    model = train_from_bags(recipe, bags, out=out / MODEL)
+    with task('training the texture model'):
+        model = train_from_bags(recipe, bags, out=out / MODEL)
     rows = [f'{surface},{grade}' for surface, grade in TRAINED.items()]
     (out / GRADES).write_text('\n'.join(['texture,grade', *rows, '']))
-    train_grades_from_bags('roughness', bags, out / GRADES, out=out / ROUGHNESS)
+    with task('training the roughness model'):
+        train_grades_from_bags('roughness', bags, out / GRADES, out=out / ROUGHNESS)
     reasons = (model.acceptance.reason, model.acceptance.decided_reason)
     line(f'trained on {len(TRAINED)} surfaces: {", ".join(TRAINED)}')
     for reason in filter(None, reasons):
@@ -268,16 +285,21 @@ def slide_over(operator: Operator, request: ExplorationRequest, title: str, expe
         rejected = expected == ACCEPTED and answer.texture.rejection is not Rejection.NONE
         if not left or (made.ended and not rejected):
             break
-        line(f'· {title:<28}{made.outcome}; trying again')
+        line(f'· {title:<28}{made.outcome}; this try does not count, trying again')
     return made
 
 
-def _report(slides: Sequence[Slide], out: Path) -> None:
-    """Draw the picture, and count the answers that are right."""
-    draw([slide for slide in slides if slide.expected], out / PICTURE)
-    right = sum(slide.as_expected for slide in slides)
-    section(f'Done: {right} of {len(slides)} results as expected. Look at {out / PICTURE}')
-    line(f'training slides, models and the log of the nodes are in {out}/')
+def by_hand(out: Path, recipe: str, dashboard_port: int) -> tuple[str, str]:
+    """Return the commands with which a user explores with the model of the demonstration, beside other emulators."""
+    # As it can be typed in this folder; elsewhere, after a build with colcon, the command is on the path.
+    texture = '.venv/bin/texture' if Path('.venv/bin/texture').exists() else 'texture'
+    arguments = ['namespace:=demo', 'surface:=leather', f'model:={out / MODEL}.npz']
+    if recipe != 'default':
+        arguments.append(f'recipe:={out / MODEL}.json')
+    if dashboard_port:
+        arguments += ['dashboard:=true', f'dashboard_port:={dashboard_port}']
+    motion = ['linear_slide', '--namespace', 'demo', '--speed', f'{SPEED_M_S:g}', '--distance', f'{DISTANCE_M:g}']
+    return shlex.join([texture, 'launch', 'emulator', *arguments]), shlex.join([texture, 'explore', *motion])
 
 
 def draw(slides: Sequence[Slide], path: Path) -> None:
@@ -292,7 +314,7 @@ def draw(slides: Sequence[Slide], path: Path) -> None:
             axis.text(
                 0.0,
                 0.5,
-                'green: accepted\norange: rejected\ngrey: the other surfaces',
+                'green: accepted\norange: rejected\ngrey: the other surfaces\n\nLines begin with the\nfirst estimate.',
                 transform=axis.transAxes,
                 va='center',
             )
@@ -301,6 +323,8 @@ def draw(slides: Sequence[Slide], path: Path) -> None:
         axes[0, 0].set_xlim(0.0, 1.05 * max(slide.answer.texture.evidence_s for slide in slides))
         for axis in axes[:, 0]:
             axis.set_ylabel('probability')
+        for axis in axes.ravel():
+            axis.tick_params(labelbottom=True)
         for axis in axes[-1]:
             axis.set_xlabel('sliding time (s)')
 
@@ -309,12 +333,10 @@ def _draw_slide(axis: Any, slide: Slide) -> None:
     estimates = [estimate for estimate in (*slide.estimates, slide.answer.texture) if estimate.probabilities]
     final = slide.answer.texture
     accepted = final.rejection is Rejection.NONE
-    # Before the first window all surfaces are equally probable
-    count = len(final.probabilities) or 1
-    seconds = [0.0, *(estimate.evidence_s for estimate in estimates)]
+    seconds = [estimate.evidence_s for estimate in estimates]
     best = int(np.argmax(final.probabilities)) if final.probabilities else -1
-    for number in range(count):
-        values = [1.0 / count, *(estimate.probabilities[number] for estimate in estimates)]
+    for number in range(len(final.probabilities)):
+        values = [estimate.probabilities[number] for estimate in estimates]
         colour = 'lightgrey' if number != best else COLOURS[2] if accepted else COLOURS[5]
         width, above = (2.0, 3) if number == best else (1.0, 2)
         axis.plot(seconds, values, color=colour, marker='.', linewidth=width, zorder=above)
