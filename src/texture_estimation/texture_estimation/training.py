@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -387,6 +388,9 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
         speed_margin=recipe.training.speed_margin,
         force_margin=recipe.training.force_margin,
     )
+    quiet: defaultdict[str, list[str]] = defaultdict(list)
+    for label, made in zip(of_slides, conditions, strict=True):
+        quiet[label].append(domain.quiet(made))
     acceptance = Acceptance(0 if fitted.held_out is None else len(slides), recipe.training.rates, domain)
     if not acceptance.reason:
         followed_slides = Followed(bound, examples)
@@ -426,6 +430,11 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
             'hop_s': examples.hop_s,
             'calibration': calibrated.note,
             'held_out_window_accuracy': accuracy,
+            'quiet': [
+                f"'{label}' is {found[0]}: a finger that feels nothing shows the same, so such slides are rejected"
+                for label, found in sorted(quiet.items())
+                if all(found)
+            ],
         },
         examples=TrainingExamples.of(examples.values, codes),
     )

@@ -50,6 +50,7 @@ if TYPE_CHECKING:
 # Labelled slides with their signals: read once from bags, or given as arrays.
 
 HOPS = 4  # windows of the least distance overlap so often
+LEAST_AT_REST = 10  # samples before the touch that show a level
 GAP_NS = NANOSECONDS  # between two slides that are given as arrays
 # Speeds and forces that differ by less are one condition: an arm deviates from its request.
 SAME_RATIO, SAME_RAD = 1.05, 0.1
@@ -414,7 +415,12 @@ class SlideDataset:
         motions = {slide.name: slide.motion for slide in self.slides if slide.motion}
         slides = {slide.name: slide for slide in self.slides}
         conditions = {
-            name: replace(made, session=slides[name].session, place=slides[name].place)
+            name: replace(
+                made,
+                session=slides[name].session,
+                place=slides[name].place,
+                rest=_rest_levels(slides[name], feature_set.topics),
+            )
             for name, made in features.conditions.items()
         }
         return replace(
@@ -515,6 +521,18 @@ def _described(slide: LabelledSlide, feature_set: FeatureSet, events: Sequence[W
     """Return the feature vectors of the windows of a slide under its name; not its end."""
     vectors = (vector for vector in feature_set.extract_many(events) if not vector.last)
     return [replace(vector, exploration_id=slide.name) for vector in vectors]
+
+
+def _rest_levels(slide: LabelledSlide, topics: Sequence[str]) -> tuple[tuple[str, float], ...]:
+    """Return the standard deviation of each channel before the touch; () where too little of it was recorded."""
+    found: list[tuple[str, float]] = []
+    for topic in topics:
+        rest = slide.at_rest(topic)
+        if len(rest) < LEAST_AT_REST:
+            return ()
+        names = (f'{topic}/{channel}' for channel in slide.signals[topic][0].channels)
+        found += zip(names, rest.std(axis=0).tolist(), strict=True)
+    return tuple(found)
 
 
 def no_window(dataset: SlideDataset, feature_set: FeatureSet) -> InvalidData:
