@@ -98,8 +98,8 @@ def test_a_slide_that_adds_less_power_than_the_sensor_has_at_rest_is_outside_whe
     noise = at_level(10.0, rest=(('signal/pac', 10.0),))
     domain = trained_on(noise, at_level(30.0, rest=(('signal/pac', 12.0),)))  # 11 at rest, on average
     sentence = (
-        'outside the training: as quiet as the sensor at rest, signal/pac 15.5, at rest 11: a finger that feels nothing '
-        'shows the same'
+        'outside the training: as quiet as the sensor at rest, signal/pac 15.5, at rest 11: a finger that feels '
+        'nothing shows the same'
     )
     assert domain.deviation(at_level(15.5)) == sentence  # 15.56 is √2 times as much
     assert domain.deviation(at_level(15.6)) == ''
