@@ -276,8 +276,9 @@ def finding_as_json(finding: Finding) -> dict[str, Any]:
     }
 
 
-def charts_of(protocol: PaperProtocol, numbers: Mapping[str, Any], name: str, out: Path) -> Path:
+def charts_of(protocol: PaperProtocol, result: ExperimentResult, out: Path) -> Path:
     """Draw the figures of an experiment's JSON: the means over seeds with their intervals, where there are several."""
+    numbers, name = result.numbers, result.name
     panels: dict[str, dict[str, tuple[float | None, Interval]]] = {}
     for task in protocol.tasks:
         panels[task.name] = {}
@@ -285,7 +286,10 @@ def charts_of(protocol: PaperProtocol, numbers: Mapping[str, Any], name: str, ou
             figures = numbers['tasks'][task.name][method.name]
             panels[task.name][method.name] = (method.paper.test, _interval(figures))
     path = out / f'experiment_{name.replace("-", "_")}.png'
-    return figures_chart(panels, f'{name}: slides recognised, paper and simulation', path, drawn(numbers))
+    variables = ' with one set of variables' if any(m.search for task in protocol.tasks for m in task.methods) else ''
+    slides = result.data.rpartition('; ')[2]
+    title = f'{name}{variables}: slides recognised, paper and simulation; {slides}; {result.split}'
+    return figures_chart(panels, title, path, drawn(numbers))
 
 
 def drawn(numbers: Mapping[str, Any]) -> str:
