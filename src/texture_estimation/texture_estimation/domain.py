@@ -59,6 +59,7 @@ QUIET = math.sqrt(2.0)  # a slide whose level is less than this many times that 
 TURNING_MOTIONS = ('circular',)
 REPLAYS = 'file/'  # a sensor that replays a file is named after the file, not after what measured
 OUTSIDE = 'outside the training'
+UNFELT = 'a finger that feels nothing shows the same'
 ONE_PLACE = 'trained at one place of each surface: elsewhere it may be rejected'
 
 
@@ -153,7 +154,7 @@ class Domain:
             if is_beyond(rms, trained, LEVEL_MARGIN):
                 found.append(f'signal level {rms:.3g} of {channel}, trained {_range(trained)}')
         if quiet := self.quiet(conditions):
-            found.append(f'{quiet}: a finger that feels nothing shows the same')
+            found.append(f'{quiet}: {UNFELT}')
         return f'{OUTSIDE}: {"; ".join(found)}' if found else ''
 
     def quiet(self, conditions: SlideConditions | RunningConditions) -> str:

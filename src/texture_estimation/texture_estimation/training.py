@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -17,7 +16,7 @@ from scipy.optimize import minimize_scalar
 from texture_core.errors import InvalidData
 from texture_core.types import AnyArray, Array
 from texture_estimation.acceptance import Acceptance, HeldOutSlide
-from texture_estimation.domain import Domain
+from texture_estimation.domain import UNFELT, Domain
 from texture_estimation.evidence_rules import EvidenceRule, followed
 from texture_estimation.gaussians import ClassDistance, compared_start
 from texture_estimation.learners.learner import (
@@ -388,9 +387,7 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
         speed_margin=recipe.training.speed_margin,
         force_margin=recipe.training.force_margin,
     )
-    quiet: defaultdict[str, list[str]] = defaultdict(list)
-    for label, made in zip(of_slides, conditions, strict=True):
-        quiet[label].append(domain.quiet(made))
+    loud = {label for label, made in zip(of_slides, conditions, strict=True) if not domain.quiet(made)}
     acceptance = Acceptance(0 if fitted.held_out is None else len(slides), recipe.training.rates, domain)
     if not acceptance.reason:
         followed_slides = Followed(bound, examples)
@@ -431,9 +428,9 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
             'calibration': calibrated.note,
             'held_out_window_accuracy': accuracy,
             'quiet': [
-                f"'{label}' is {found[0]}: a finger that feels nothing shows the same, so such slides are rejected"
-                for label, found in sorted(quiet.items())
-                if all(found)
+                f"'{label}' is {domain.quiet(made)}: {UNFELT}, so such slides are rejected"
+                for label, made in dict(zip(of_slides, conditions, strict=True)).items()
+                if label not in loud
             ],
         },
         examples=TrainingExamples.of(examples.values, codes),

@@ -525,14 +525,11 @@ def _described(slide: LabelledSlide, feature_set: FeatureSet, events: Sequence[W
 
 def _rest_levels(slide: LabelledSlide, topics: Sequence[str]) -> tuple[tuple[str, float], ...]:
     """Return the standard deviation of each channel before the touch; () where too little of it was recorded."""
-    found: list[tuple[str, float]] = []
-    for topic in topics:
-        rest = slide.at_rest(topic)
-        if len(rest) < LEAST_AT_REST:
-            return ()
-        names = (f'{topic}/{channel}' for channel in slide.signals[topic][0].channels)
-        found += zip(names, rest.std(axis=0).tolist(), strict=True)
-    return tuple(found)
+    rests = {topic: slide.at_rest(topic) for topic in topics}
+    if min(map(len, rests.values())) < LEAST_AT_REST:
+        return ()
+    names = (f'{topic}/{channel}' for topic in topics for channel in slide.signals[topic][0].channels)
+    return tuple(zip(names, np.concatenate([rest.std(axis=0) for rest in rests.values()]).tolist(), strict=True))
 
 
 def no_window(dataset: SlideDataset, feature_set: FeatureSet) -> InvalidData:
