@@ -194,10 +194,9 @@ def _levels(slides: Sequence[SlideConditions]) -> dict[str, Interval]:
 
 
 def _rest(slides: Sequence[SlideConditions]) -> dict[str, float]:
-    """Return the median level of each channel before the touch; none if a slide does not show it."""
-    if not slides or not all(slide.rest for slide in slides):
-        return {}
-    return {name: float(np.median([dict(slide.rest)[name] for slide in slides])) for name, _ in slides[0].rest}
+    """Return the median level of each channel before the touch, of the slides that show it."""
+    shown = [dict(slide.rest) for slide in slides if slide.rest]
+    return {name: float(np.median([rest[name] for rest in shown])) for name in shown[0]} if shown else {}
 
 
 def _names(names: Iterable[str]) -> tuple[str, ...]:

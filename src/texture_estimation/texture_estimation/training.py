@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -387,7 +388,8 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
         speed_margin=recipe.training.speed_margin,
         force_margin=recipe.training.force_margin,
     )
-    loud = {label for label, made in zip(of_slides, conditions, strict=True) if not domain.quiet(made)}
+    quiet = [(label, why) for label, made in zip(of_slides, conditions, strict=True) if (why := domain.quiet(made))]
+    counts = Counter(label for label, _ in quiet)
     acceptance = Acceptance(0 if fitted.held_out is None else len(slides), recipe.training.rates, domain)
     if not acceptance.reason:
         followed_slides = Followed(bound, examples)
@@ -428,9 +430,8 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
             'calibration': calibrated.note,
             'held_out_window_accuracy': accuracy,
             'quiet': [
-                f"'{label}' is {domain.quiet(made)}: {UNFELT}, so such slides are rejected"
-                for label, made in dict(zip(of_slides, conditions, strict=True)).items()
-                if label not in loud
+                f"{counts[label]} of {domain.slides[label]} slides of '{label}' are {why}: {UNFELT}; they are rejected"
+                for label, why in dict(quiet).items()
             ],
         },
         examples=TrainingExamples.of(examples.values, codes),

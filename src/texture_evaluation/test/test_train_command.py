@@ -194,7 +194,9 @@ def test_a_surface_that_adds_nothing_to_the_noise_of_the_sensor_is_named_and_rej
     evaluated: TextureModel, simulated: Path
 ) -> None:
     [sentence] = evaluated.training['quiet']  # the simulated glass: its relief is below a hundredth of the noise
-    assert re.match(r"'glass' is as quiet as the sensor at rest, signal/dynamic 2\d.*, at rest 2\d", sentence), sentence
+    assert re.match(
+        r"4 of 4 slides of 'glass' are as quiet as the sensor at rest, signal/dynamic 2\d.*, at rest 2\d", sentence
+    ), sentence
     assert sentence in summary(evaluated, Path('model.npz'))
     ends = evaluate(evaluated, [simulated], '5-6').known
     assert {one.surface for one in ends if 'at rest' in one.end.message} == {'glass'}
