@@ -278,18 +278,17 @@ def finding_as_json(finding: Finding) -> dict[str, Any]:
 
 def charts_of(protocol: PaperProtocol, result: ExperimentResult, out: Path) -> Path:
     """Draw the figures of an experiment's JSON: the means over seeds with their intervals, where there are several."""
-    numbers, name = result.numbers, result.name
     panels: dict[str, dict[str, tuple[float | None, Interval]]] = {}
     for task in protocol.tasks:
         panels[task.name] = {}
         for method in task.methods:
-            figures = numbers['tasks'][task.name][method.name]
+            figures = result.numbers['tasks'][task.name][method.name]
             panels[task.name][method.name] = (method.paper.test, _interval(figures))
-    path = out / f'experiment_{name.replace("-", "_")}.png'
+    path = out / f'experiment_{result.name.replace("-", "_")}.png'
     variables = ' with one set of variables' if any(m.search for task in protocol.tasks for m in task.methods) else ''
-    slides = result.data.rpartition('; ')[2]
-    title = f'{name}{variables}: slides recognised, paper and simulation; {slides}; {result.split}'
-    return figures_chart(panels, title, path, drawn(numbers))
+    about = f'{result.data.rpartition("; ")[2]}; {result.split}'
+    title = f'{result.name}{variables}: slides recognised, paper and simulation; {about}'
+    return figures_chart(panels, title, path, drawn(result.numbers))
 
 
 def drawn(numbers: Mapping[str, Any]) -> str:

@@ -169,16 +169,15 @@ class SimulatedTextures:
 
 def errors_chart(result: ExperimentResult, out: Path) -> Path:
     """Draw the error of each regressor, the means over seeds, next to the paper's."""
-    numbers = result.numbers
     panels = {
         f'{part} textures': {
-            name: (paper[part], Interval(*numbers['regressors'][name][part]['over_seeds']))
-            for name, paper in numbers['paper'].items()
+            name: (paper[part], Interval(*result.numbers['regressors'][name][part]['over_seeds']))
+            for name, paper in result.numbers['paper'].items()
         }
         for part in ('seen', 'unseen')
     }
     title = f'roughness: errors of grades, paper and simulation; {SLIDES}; {result.split}'
-    return figures_chart(panels, title, out / 'experiment_roughness.png', drawn(numbers), ERRORS)
+    return figures_chart(panels, title, out / 'experiment_roughness.png', drawn(result.numbers), ERRORS)
 
 
 SHADES = {'training': COLOURS[2], 'unseen': COLOURS[0]}  # green and blue as in the paper

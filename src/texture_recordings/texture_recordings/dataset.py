@@ -413,16 +413,10 @@ class SlideDataset:
         surfaces = {slide.name: slide.surface for slide in self.slides}
         features = LabelledFeatures.from_vectors(vectors, surfaces)
         motions = {slide.name: slide.motion for slide in self.slides if slide.motion}
-        slides = {slide.name: slide for slide in self.slides}
-        conditions = {
-            name: replace(
-                made,
-                session=slides[name].session,
-                place=slides[name].place,
-                rest=_rest_levels(slides[name], feature_set.topics),
-            )
-            for name, made in features.conditions.items()
-        }
+        conditions = dict(features.conditions)
+        for slide in (one for one in self.slides if one.name in conditions):
+            made, rest = conditions[slide.name], _rest_levels(slide, feature_set.topics)
+            conditions[slide.name] = replace(made, session=slide.session, place=slide.place, rest=rest)
         return replace(
             features,
             motions=motions,
