@@ -659,7 +659,7 @@ def generalisation_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
             (
                 f'1. Other places: one of {CELLS} cells trained. {data}, n = {_n_of(drawn)}',
                 f'2. Other places: several of {CELLS} cells trained. {data}, n = {_n_of(few)}',
-                '3. Another day, finger, run or speed',
+                '3. Tested on another day, finger, run, speed or place than trained: n slides, recorded or simulated',
             ),
             strict=True,
         ):

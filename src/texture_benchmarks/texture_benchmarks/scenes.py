@@ -295,13 +295,12 @@ def ablation_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
     terms = {name: {t: row for t, row in figures.items() if isinstance(row, dict)} for name, figures in panels.items()}
     rows = -(-len(panels) // COLUMNS)
     size = (6.0, 0.6 + rows * (0.9 + 0.27 * max(map(len, terms.values()))))
-    with chart(path, size, 'Change of accuracy without a term of a simulated scene') as figure:
+    title = 'Change of accuracy without a term of a simulated scene; n slides tested, others trained'
+    with chart(path, size, title) as figure:
         grid = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
         for axes, (name, row) in zip(grid, terms.items(), strict=False):
             _draw_terms(axes, row)
-            axes.set_title(
-                f'{name}: {panels[name]["accuracy"]:.0%}'.replace('%', ' %').replace('with one of', 'and one of')
-            )
+            axes.set_title(f'{name}: {100 * panels[name]["accuracy"]:.0f} %,\nn = {panels[name]["tested"]}')
         for axes in grid[len(panels) :]:
             axes.axis('off')
         grid[len(panels) - 1].set_xlabel('change (percentage points)')

@@ -46,7 +46,7 @@ DEADLINE_S = 60.0
 SHORT = """
 import sys
 from texture_bringup import command, demo
-demo.TRAINING_SLIDES, demo.TRAINED = 2, {'glass': 1.0, 'ridge_2mm_deep': 4.5}
+demo.TRAINING_SLIDES, demo.TRAINED = 2, {'brushed_metal': 1.0, 'ridge_2mm_deep': 4.5}
 sys.exit(command.main(sys.argv[1:]))
 """
 
@@ -139,7 +139,7 @@ def test_an_aborted_slide_and_a_rejected_one_over_a_trained_surface_are_made_aga
 
 @pytest.mark.ros
 def test_it_accepts_trained_surfaces_and_rejects_others_and_leaves_a_picture(tmp_path, monkeypatch, capsys) -> None:
-    monkeypatch.setattr(demo, 'RECOGNISED', ('glass', 'ridge_2mm_deep'))
+    monkeypatch.setattr(demo, 'RECOGNISED', ('brushed_metal', 'ridge_2mm_deep'))
     monkeypatch.setattr(demo, 'UNTRAINED', ('cardboard',))
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv('XDG_RUNTIME_DIR', str(tmp_path))
@@ -147,7 +147,7 @@ def test_it_accepts_trained_surfaces_and_rejects_others_and_leaves_a_picture(tmp
     said = capsys.readouterr().out
     assert right, said
     for line in (
-        r'✓ glass +accepted as glass after [\d.]+ s, ended early',
+        r'✓ brushed_metal +accepted as brushed_metal after [\d.]+ s, ended early',
         r'✓ ridge_2mm_deep +accepted as ridge_2mm_deep',
         r'✓ cardboard +rejected, (novel|ambiguous)',
         r'✓ ridge_2mm_deep at 0\.02 m/s +rejected, outside the training: speed 0\.0[12]\d* m/s',

@@ -68,7 +68,7 @@ def _free_port() -> int:
 
 # Surfaces of the scene `twelve_textures`, with made-up grades of roughness.
 TRAINED = {
-    'glass': 1.0,
+    'brushed_metal': 1.0,
     'leather': 2.0,
     'woven_cloth': 2.5,
     'grid_2mm': 3.0,
@@ -77,7 +77,7 @@ TRAINED = {
     'ridge_2mm_shallow': 4.0,
     'ridge_2mm_deep': 4.5,
 }
-RECOGNISED = ('glass', 'leather', 'woven_cloth', 'ridge_2mm_deep')
+RECOGNISED = ('brushed_metal', 'leather', 'woven_cloth', 'ridge_2mm_deep')
 UNTRAINED = ('cardboard', 'ridge_3mm')
 TRAINING_SLIDES = 40  # enough that a slide may end early: 299 must be held out to show 1 % wrong decisions
 SPEED_M_S, FORCE_N, DISTANCE_M = 0.05, 1.0, 0.06

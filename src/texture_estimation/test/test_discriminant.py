@@ -61,18 +61,19 @@ def day(slide):
 
 
 @pytest.mark.parametrize(
-    ('session', 'place', 'by_day'),
+    ('conditions', 'by_day'),
     [
-        (day, lambda slide: '', True),
-        (lambda slide: slide, day, True),  # a bag for each slide defines no session, but places are held out
-        (lambda slide: slide, lambda slide: '', False),
-        (lambda slide: 'day 0', lambda slide: '', False),
-        (lambda slide: '', lambda slide: '', False),
+        ({'session': day}, True),
+        ({'session': lambda slide: slide, 'place': day}, True),  # a bag for each slide defines no session
+        ({'sensor': day}, True),
+        ({'session': lambda slide: slide}, False),
+        ({'session': lambda _: 'day 0'}, False),
+        ({}, False),
     ],
 )
-def test_slides_of_one_day_or_place_are_held_out_together_and_else_by_themselves(session, place, by_day, examples):
+def test_slides_of_one_day_place_or_finger_are_held_out_together_and_else_by_themselves(conditions, by_day, examples):
     slides = np.unique(examples.groups).tolist()
-    made = {slide: SlideConditions(session=session(slide), place=place(slide)) for slide in slides}
+    made = {slide: SlideConditions(**{name: of(slide) for name, of in conditions.items()}) for slide in slides}
     parts = held_out_parts(replace(examples, conditions=made))
     assert parts is None if not by_day else parts.tolist() == [int(slide[-1]) % 2 for slide in slides]
 

@@ -94,6 +94,22 @@ def test_a_signal_far_stronger_or_weaker_than_any_trained_is_outside(rms, within
     assert domain.deviation(at_level(rms, 'signal/other')) == ''
 
 
+def test_a_slide_that_adds_less_power_than_the_sensor_has_at_rest_is_outside_where_that_is_known():
+    noise = at_level(10.0, rest=(('signal/pac', 10.0),))
+    domain = trained_on(noise, at_level(30.0, rest=(('signal/pac', 12.0),)))  # 11 at rest, on average
+    sentence = (
+        'outside the training: as quiet as the sensor at rest, signal/pac 15.5, at rest 11: a finger that feels '
+        'nothing shows the same'
+    )
+    assert domain.deviation(at_level(15.5)) == sentence  # 15.56 is √2 times as much
+    assert domain.deviation(at_level(15.6)) == ''
+    assert trained_on(noise, at_level(30.0)).rest == {'signal/pac': 10.0}  # of the slides that show it
+    assert trained_on(at_level(10.0)).deviation(at_level(10.0)) == ''
+    # A channel that is louder, or of which the level is no feature, may show the touch.
+    both = trained_on(at_level(10.0, rest=(('signal/pac', 10.0), ('signal/pdc', 1.0))))
+    assert both.deviation(at_level(10.0)) == ''
+
+
 def test_added_slides_widen_the_domain():
     added = conditions(0.1, 2.0, 'circular', 'biotac', (1.57,))
     assert TRAINED.deviation(added)

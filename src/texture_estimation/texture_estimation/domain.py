@@ -54,10 +54,12 @@ def is_beyond(value: float, interval: Interval | None, margin: float) -> bool:
 SPEED_MARGIN, FORCE_MARGIN = 0.15, 0.3
 DIRECTION_MARGIN_RAD = 0.35
 LEVEL_MARGIN = 1.0
+QUIET = math.sqrt(2.0)  # a slide whose level is less than this many times that at rest adds less power than noise has
 # Motions whose direction turns within a window: they cover all directions, and theirs is not compared.
 TURNING_MOTIONS = ('circular',)
 REPLAYS = 'file/'  # a sensor that replays a file is named after the file, not after what measured
 OUTSIDE = 'outside the training'
+UNFELT = 'a finger that feels nothing shows the same'
 ONE_PLACE = 'trained at one place of each surface: elsewhere it may be rejected'
 
 
@@ -79,6 +81,7 @@ class Domain:
     slides: Mapping[str, int] = field(default_factory=dict)
     speed_margin: float = SPEED_MARGIN
     force_margin: float = FORCE_MARGIN
+    rest: Mapping[str, float] = field(default_factory=dict)  # median level of each channel before the touch
     places: int = 0  # or sessions, of the label that has most; 0 if unknown
 
     def __post_init__(self) -> None:
@@ -100,6 +103,7 @@ class Domain:
             force_n=interval_of((slide.force_n, *slide.force_range_n) for slide in slides),
             directions_rad=_directions(slides),
             levels=_levels(slides),
+            rest=_rest(slides),
             slides=dict(Counter(labels)),
             places=_places(slides, labels),
         )
@@ -149,7 +153,17 @@ class Domain:
             trained = self.levels.get(channel)
             if is_beyond(rms, trained, LEVEL_MARGIN):
                 found.append(f'signal level {rms:.3g} of {channel}, trained {_range(trained)}')
+        if quiet := self.quiet(conditions):
+            found.append(f'{quiet}: {UNFELT}')
         return f'{OUTSIDE}: {"; ".join(found)}' if found else ''
+
+    def quiet(self, conditions: SlideConditions | RunningConditions) -> str:
+        """Return that all channels of an exploration are as quiet as the sensor at rest; '' if not, or if unknown."""
+        levels = {channel: rms for channel, rms, *_ in conditions.levels}
+        if not self.rest or any(levels.get(name, math.inf) >= QUIET * rest for name, rest in self.rest.items()):
+            return ''
+        name, rest = next(iter(self.rest.items()))
+        return f'as quiet as the sensor at rest, {name} {levels[name]:.3g}, at rest {rest:.3g}'
 
 
 def _directions(slides: Sequence[SlideConditions]) -> tuple[float, ...]:
@@ -177,6 +191,12 @@ def _levels(slides: Sequence[SlideConditions]) -> dict[str, Interval]:
             by_channel[channel].append(means)
     found = {channel: interval_of(means) for channel, means in by_channel.items()}
     return {channel: interval for channel, interval in found.items() if interval is not None}
+
+
+def _rest(slides: Sequence[SlideConditions]) -> dict[str, float]:
+    """Return the median level of each channel before the touch, of the slides that show it."""
+    shown = [dict(slide.rest) for slide in slides if slide.rest]
+    return {name: float(np.median([rest[name] for rest in shown])) for name in shown[0]} if shown else {}
 
 
 def _names(names: Iterable[str]) -> tuple[str, ...]:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -16,7 +17,7 @@ from scipy.optimize import minimize_scalar
 from texture_core.errors import InvalidData
 from texture_core.types import AnyArray, Array
 from texture_estimation.acceptance import Acceptance, HeldOutSlide
-from texture_estimation.domain import Domain
+from texture_estimation.domain import UNFELT, Domain
 from texture_estimation.evidence_rules import EvidenceRule, followed
 from texture_estimation.gaussians import ClassDistance, compared_start
 from texture_estimation.learners.learner import (
@@ -387,6 +388,8 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
         speed_margin=recipe.training.speed_margin,
         force_margin=recipe.training.force_margin,
     )
+    quiet = [(label, why) for label, made in zip(of_slides, conditions, strict=True) if (why := domain.quiet(made))]
+    counts = Counter(label for label, _ in quiet)
     acceptance = Acceptance(0 if fitted.held_out is None else len(slides), recipe.training.rates, domain)
     if not acceptance.reason:
         followed_slides = Followed(bound, examples)
@@ -426,6 +429,10 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
             'hop_s': examples.hop_s,
             'calibration': calibrated.note,
             'held_out_window_accuracy': accuracy,
+            'quiet': [
+                f"{counts[label]} of {domain.slides[label]} slides of '{label}' are {why}: {UNFELT}; they are rejected"
+                for label, why in dict(quiet).items()
+            ],
         },
         examples=TrainingExamples.of(examples.values, codes),
     )

@@ -192,6 +192,18 @@ def test_distinct_surfaces_are_recognised_and_the_figures_agree_with_each_other(
     assert 0 < figures['latency_us']['median'] <= figures['latency_us']['p99']
 
 
+def test_a_surface_that_adds_nothing_to_the_noise_of_the_sensor_is_named_and_rejected(
+    evaluated: TextureModel, simulated: Path
+) -> None:
+    [sentence] = evaluated.training['quiet']  # the simulated glass: its relief is below a hundredth of the noise
+    assert re.match(
+        r"4 of 4 slides of 'glass' are as quiet as the sensor at rest, signal/dynamic 2\d.*, at rest 2\d", sentence
+    ), sentence
+    assert sentence in summary(evaluated, Path('model.npz'))
+    ends = evaluate(evaluated, [simulated], '5-6').known
+    assert {one.surface for one in ends if 'at rest' in one.end.message} == {'glass'}
+
+
 def test_slides_of_the_training_are_named_whatever_their_bag_is_called(
     evaluated: TextureModel, simulated: Path, tmp_path: Path
 ) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from texture_core.config import write_json
 from texture_core.errors import InvalidData
-from texture_core.types import Array, ExplorationRequest, Phase
+from texture_core.types import ExplorationRequest
 from texture_estimation.model import load_model, model_stem
 from texture_estimation.training import DAY_SUFFIX, adapted
 from texture_evaluation.train import training_examples
@@ -32,7 +32,6 @@ from texture_features.windows import WindowBatch
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.slides import LabelledSlide, SlideSamples
 
-TOUCH_NS = 200_000_000  # the skin feels a touch before the arm does
 UNMEASURED = 'noise and drift were not measured, as too little was recorded before the touch'
 
 
@@ -48,25 +47,13 @@ def statistics_of(
                 f"samples of '{topic}' were lost in the slide over the plate; stop other programs on the computer, and "
                 'check again'
             )
-        one, rest = SlideSamples.of(slide, topic), _at_rest(slide, topic)
+        one, rest = SlideSamples.of(slide, topic), slide.at_rest(topic)
         samples = one.samples
         if correction is not None:
             samples = correction.apply(topic, WindowBatch(samples, one.rate_hz)).samples
             rest = correction.apply(topic, WindowBatch(rest, one.rate_hz)).samples if len(rest) else rest
         found[topic] = InputStatistics.of(samples, rest, one.rate_hz, one.channels, batches[0].sensor)
     return found
-
-
-def _at_rest(slide: LabelledSlide, topic: str) -> Array:
-    """Return the samples before the touch, (n, n_channels); none where the approach was not recorded."""
-    approaching = [one.stamp_ns for one in slide.states if one.phase is Phase.APPROACH]
-    touched = [one.stamp_ns for one in slide.states if one.phase is not Phase.APPROACH]
-    batches = slide.signals[topic]
-    # The rest ends where the approach does; without an approach the rest is unknown.
-    until_ns = min([at for at in touched if approaching and at > approaching[0]], default=0) - TOUCH_NS
-    # By sample, not by batch: the batches of a slide are joined, so one holds the rest and the touch.
-    counts = [max(0, int((until_ns - one.stamp_ns) * 1e-9 * one.sampling_rate_hz)) for one in batches]
-    return np.concatenate([one.samples[:count] for one, count in zip(batches, counts, strict=True)]).astype(np.float64)
 
 
 def store_reference(

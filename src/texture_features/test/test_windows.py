@@ -82,11 +82,23 @@ def test_windows_cover_the_guaranteed_time_and_no_more():
     assert events[-1] == SlideEnd(ns(2.0), 'e1', 0.1)
 
 
-def test_a_state_in_the_air_withdraws_the_guarantee_and_leaves_a_hole_up_to_the_next_state():
-    sliding = [state(0.02 * number, steady_s=0.1, force_n=1.0) for number in range(60)]
-    lost = [state(at, force_n=0.0) for at in (1.2, 1.22, 1.24)]
-    states = [*sliding, *lost, state(1.26, steady_s=0.6, force_n=1.0), state(2.0, Phase.LIFT)]
-    assert starts(run({'signal': stream(3.0)}, states)) == [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 1.3]
+@pytest.mark.parametrize(
+    ('lost', 'withdrawn'),
+    [
+        ({'force_n': 0.0}, True),  # in the air
+        ({'force_n': 1.6}, True),
+        ({'force_n': 1.4}, False),
+        ({'speed_m_s': 0.11}, True),
+        ({'speed_m_s': 0.09}, False),
+    ],
+)
+def test_a_state_far_from_the_slide_so_far_withdraws_the_guarantee_up_to_the_next_state(lost, withdrawn):
+    usual = {'force_n': 1.0, 'speed_m_s': 0.05}
+    sliding = [state(0.02 * number, steady_s=0.1, **usual) for number in range(60)]
+    without = [state(at, **usual | lost) for at in (1.2, 1.22, 1.24)]
+    states = [*sliding, *without, state(1.26, steady_s=0.6, **usual), state(2.0, Phase.LIFT)]
+    begins = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, *([] if withdrawn else [0.8, 0.9, 1.0, 1.1, 1.2]), 1.3]
+    assert starts(run({'signal': stream(3.0)}, states)) == begins
 
 
 def test_a_turn_leaves_a_hole_but_keeps_what_was_guaranteed():
@@ -144,12 +156,13 @@ def test_a_stream_that_begins_late_or_again_costs_only_its_windows():
     assert late[-1].skipped == 4
 
 
+@pytest.mark.parametrize('steady_s', [3600.0, 1e9])  # no guarantee holds for longer than an hour
 @pytest.mark.parametrize(('begin_s', 'windows'), [(3599.0, 6), (0.0, 6), (7200.0, 0)])
-def test_an_hour_without_samples_is_passed_over_at_once_and_counted(begin_s, windows, monkeypatch):
+def test_an_hour_without_samples_is_passed_over_at_once_and_counted(begin_s, windows, steady_s, monkeypatch):
     calls = []
     window = SlideCoverage.window
     monkeypatch.setattr(SlideCoverage, 'window', lambda slide: calls.append(1) or window(slide))
-    *cut, end = run({'signal': stream(1.0, begin_s=begin_s)}, [state(0.0, steady_s=3600.0)])
+    *cut, end = run({'signal': stream(1.0, begin_s=begin_s)}, [state(0.0, steady_s=steady_s)])
     assert (len(cut), end.skipped) == (windows, 35_996 - windows)
     assert len(calls) < 250  # one for each batch, and few more
 

@@ -498,6 +498,7 @@ class SlideConditions:
     speed_range_m_s: Interval = UNKNOWN
     force_range_n: Interval = UNKNOWN
     levels: tuple[SignalLevel, ...] = ()
+    rest: tuple[tuple[str, float], ...] = ()  # of each channel before the touch, its standard deviation
     session: str = ''
     place: str = ''
 

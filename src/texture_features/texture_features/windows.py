@@ -711,7 +711,7 @@ class WindowCutter:
                 self._skip(slide, found)
                 continue
             slide.advance()
-            event: CutWindow | None = CutWindow(
+            window = CutWindow(
                 start_ns=span.start_ns,
                 exploration_id=slide.exploration_id,
                 length_s=self._params.length_s,
@@ -725,8 +725,7 @@ class WindowCutter:
                 direction_rad=span.direction_rad,
                 tangential_force_n=span.tangential_force_n,
             )
-            if self._joiner.joins and event is not None:
-                event = self._joiner.add(event)
+            event = self._joiner.add(window) if self._joiner.joins else window
             if event is not None:
                 self._windows += 1
                 events.append(event)

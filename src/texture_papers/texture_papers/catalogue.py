@@ -67,8 +67,8 @@ def run_experiment(name: str, experiment: Experiment, seeds: int = 1) -> tuple[E
             first = replace(first, numbers=with_seeds(first.numbers, [one.numbers for one in others]))
         charts = list(first.charts)
         if name in PROTOCOLS and not experiment.tune:
-            charts.append(charts_of(PROTOCOLS[name], first.numbers, name, experiment.out))
+            charts.append(charts_of(PROTOCOLS[name], first, experiment.out))
         elif name == 'roughness' and others and not experiment.tune:
-            charts.append(rispal_experiment.errors_chart(first.numbers, experiment.out))
+            charts.append(rispal_experiment.errors_chart(first, experiment.out))
         result = replace(first, charts=tuple(charts))
         return result, result.write(experiment.out)

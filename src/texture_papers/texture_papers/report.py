@@ -276,16 +276,19 @@ def finding_as_json(finding: Finding) -> dict[str, Any]:
     }
 
 
-def charts_of(protocol: PaperProtocol, numbers: Mapping[str, Any], name: str, out: Path) -> Path:
+def charts_of(protocol: PaperProtocol, result: ExperimentResult, out: Path) -> Path:
     """Draw the figures of an experiment's JSON: the means over seeds with their intervals, where there are several."""
     panels: dict[str, dict[str, tuple[float | None, Interval]]] = {}
     for task in protocol.tasks:
         panels[task.name] = {}
         for method in task.methods:
-            figures = numbers['tasks'][task.name][method.name]
+            figures = result.numbers['tasks'][task.name][method.name]
             panels[task.name][method.name] = (method.paper.test, _interval(figures))
-    path = out / f'experiment_{name.replace("-", "_")}.png'
-    return figures_chart(panels, f'{name}: slides recognised, paper and simulation', path, drawn(numbers))
+    path = out / f'experiment_{result.name.replace("-", "_")}.png'
+    variables = ' with one set of variables' if any(m.search for task in protocol.tasks for m in task.methods) else ''
+    about = f'{result.data.rpartition("; ")[2]}; {result.split}'
+    title = f'{result.name}{variables}: slides recognised, paper and simulation; {about}'
+    return figures_chart(panels, title, path, drawn(result.numbers))
 
 
 def drawn(numbers: Mapping[str, Any]) -> str:

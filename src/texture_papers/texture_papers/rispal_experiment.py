@@ -167,17 +167,17 @@ class SimulatedTextures:
         return Answers(grades, model.calibration.window_std(stds), true, examples.labels.tolist())
 
 
-def errors_chart(numbers: Mapping[str, Any], out: Path) -> Path:
+def errors_chart(result: ExperimentResult, out: Path) -> Path:
     """Draw the error of each regressor, the means over seeds, next to the paper's."""
     panels = {
         f'{part} textures': {
-            name: (paper[part], Interval(*numbers['regressors'][name][part]['over_seeds']))
-            for name, paper in numbers['paper'].items()
+            name: (paper[part], Interval(*result.numbers['regressors'][name][part]['over_seeds']))
+            for name, paper in result.numbers['paper'].items()
         }
         for part in ('seen', 'unseen')
     }
-    title = 'roughness: errors of grades, paper and simulation'
-    return figures_chart(panels, title, out / 'experiment_roughness.png', drawn(numbers), ERRORS)
+    title = f'roughness: errors of grades, paper and simulation; {SLIDES}; {result.split}'
+    return figures_chart(panels, title, out / 'experiment_roughness.png', drawn(result.numbers), ERRORS)
 
 
 SHADES = {'training': COLOURS[2], 'unseen': COLOURS[0]}  # green and blue as in the paper
@@ -193,14 +193,18 @@ def grades_chart(panels: Mapping[str, Mapping[str, ByTexture]], path: str | Path
     human = {name: row['human'] for series in panels.values() for one in series.values() for name, row in one.items()}
     order = sorted(human, key=lambda texture: human[texture] or 0.0)
     place = {name: index for index, name in enumerate(order)}
-    with chart(path, (5.8, 0.22 * len(order) + 1.6), 'Roughness of simulated textures, people and models') as figure:
+    title = (
+        f'Roughness: people, and models on simulated slides. {SLIDES}; thick bar: one standard deviation over them, '
+        'thin: 90 % interval of a slide, no dot: no grade given'
+    )
+    with chart(path, (5.8, 0.22 * len(order) + 2.2), title) as figure:
         columns = figure.subplots(1, len(panels), sharex=True, sharey=True, squeeze=False)[0]
         for axes, (name, series) in zip(columns, panels.items(), strict=True):
             axes.scatter(list(human.values()), [place[texture] for texture in human], marker='|', s=90,
                          color=COLOURS[5], label='people', zorder=4)  # fmt: skip
             for kind, one in series.items():
                 _grade_bars(axes, one, place, kind)
-            axes.set(title=name, xlim=(0.2, 5.8), xticks=range(1, 6))
+            axes.set(title=name.replace('ours', OURS).replace(', ', ',\n'), xlim=(0.2, 5.8), xticks=range(1, 6))
         columns[0].set_yticks(range(len(order)), [name.replace('_', ' ') for name in order])
         columns[0].set_ylim(len(order) - 0.4, -0.6)
         columns[len(columns) // 2].set_xlabel('grade, 1 (smooth) to 5 (rough)')
@@ -221,6 +225,7 @@ def _grade_bars(axes: Any, table: ByTexture, place: Mapping[str, int], kind: str
 
 SCENE, GRADES = 'roughness', 'ets_roughness'
 SCANS = 200
+SLIDES = f'25 textures, {SCANS} slides each'
 # Scans of each texture, and those with a texture left out.
 COUNTS, QUICK_COUNTS = (SCANS, 50), (12, 4)
 QUICK_STEP = 8  # between the textures that the paper's regressors have left out

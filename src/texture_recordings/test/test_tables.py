@@ -71,6 +71,14 @@ def test_samples_are_those_of_the_file_scaled_and_in_their_order(tmp_path: Path,
     assert batch.sampling_rate_hz == pytest.approx(RATE_HZ, rel=0.005)
 
 
+@pytest.mark.parametrize(('line', 'sensor'), [('', 'lab_a'), ('sensor: skin/left\n', 'skin/left')])
+def test_a_sensor_that_a_mapping_does_not_name_is_that_of_this_mapping_alone(tmp_path, line, sensor) -> None:
+    (tmp_path / 'lab_a.yaml').write_text(
+        f'streams: {{signal: {{columns: [x], rate_hz: 9}}}}\nlabel: {{value: a}}\n{line}'
+    )
+    assert load_mapping(tmp_path / 'lab_a.yaml').sensor == sensor
+
+
 def test_malformed_rows_are_counted_and_named_by_file_row_and_column(tmp_path: Path, mapping: TableMapping) -> None:
     broken = {
         FIRST_STROKE + 10: '5000500.00;stroke 1;oops;1.0;2.0;150.0',

@@ -50,6 +50,7 @@ if TYPE_CHECKING:
 # Labelled slides with their signals: read once from bags, or given as arrays.
 
 HOPS = 4  # windows of the least distance overlap so often
+LEAST_AT_REST = 10  # samples before the touch that show a level
 GAP_NS = NANOSECONDS  # between two slides that are given as arrays
 # Speeds and forces that differ by less are one condition: an arm deviates from its request.
 SAME_RATIO, SAME_RAD = 1.05, 0.1
@@ -419,11 +420,10 @@ class SlideDataset:
         surfaces = {slide.name: slide.surface for slide in self.slides}
         features = LabelledFeatures.from_vectors(vectors, surfaces)
         motions = {slide.name: slide.motion for slide in self.slides if slide.motion}
-        slides = {slide.name: slide for slide in self.slides}
-        conditions = {
-            name: replace(made, session=slides[name].session, place=slides[name].place)
-            for name, made in features.conditions.items()
-        }
+        conditions = dict(features.conditions)
+        for slide in (one for one in self.slides if one.name in conditions):
+            made, rest = conditions[slide.name], _rest_levels(slide, feature_set.topics)
+            conditions[slide.name] = replace(made, session=slide.session, place=slide.place, rest=rest)
         return replace(
             features,
             motions=motions,
@@ -522,6 +522,15 @@ def _described(slide: LabelledSlide, feature_set: FeatureSet, events: Sequence[W
     """Return the feature vectors of the windows of a slide under its name; not its end."""
     vectors = (vector for vector in feature_set.extract_many(events) if not vector.last)
     return [replace(vector, exploration_id=slide.name) for vector in vectors]
+
+
+def _rest_levels(slide: LabelledSlide, topics: Sequence[str]) -> tuple[tuple[str, float], ...]:
+    """Return the standard deviation of each channel before the touch; () where too little of it was recorded."""
+    rests = {topic: slide.at_rest(topic) for topic in topics}
+    if min(map(len, rests.values())) < LEAST_AT_REST:
+        return ()
+    names = (f'{topic}/{channel}' for topic in topics for channel in slide.signals[topic][0].channels)
+    return tuple(zip(names, np.concatenate([rest.std(axis=0) for rest in rests.values()]).tolist(), strict=True))
 
 
 def no_window(dataset: SlideDataset, feature_set: FeatureSet) -> InvalidData:

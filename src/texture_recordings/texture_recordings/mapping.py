@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from texture_core.config import find_file, from_mapping, load_yaml, param, unknown_name
@@ -204,7 +204,7 @@ class TableMapping:
     slides: SlideBorders = field(default_factory=SlideBorders)
     conditions: Mapping[str, Quantity] = field(default_factory=dict)  # what is not named is unknown
     session: str = param('', "Names the column or field by which slides go into bags; '' makes one bag a surface.")
-    sensor: str = param('imported', 'Names the sensor in the bags.')
+    sensor: str = param('', "Names the sensor in the bags; '' takes the name of the mapping file, without its ending.")
     motion: str = param('linear_slide', 'Names the motion in the bags.')
 
     def __post_init__(self) -> None:
@@ -264,7 +264,8 @@ class TableMapping:
 def load_mapping(name_or_path: str | Path) -> TableMapping:
     """Return the mapping in a file, or one that the package ships in config/mappings, by name."""
     path = find_file(str(name_or_path), 'texture_recordings', 'config/mappings', 'mapping')
-    return mapping_from(load_yaml(path, 'mapping'), f"mapping '{path}'")
+    mapping = mapping_from(load_yaml(path, 'mapping'), f"mapping '{path}'")
+    return mapping if mapping.sensor else replace(mapping, sensor=path.stem)
 
 
 def mapping_from(content: object, where: str = 'mapping') -> TableMapping:

@@ -37,6 +37,8 @@ from texture_recordings.bags import EXPLORATION, find_bags, read_bag
 # --------------------
 # One labelled slide in a bag.
 
+TOUCH_NS = 200_000_000  # the skin feels a touch before the arm does; of a shorter approach, half
+
 
 @dataclass(frozen=True)
 class LabelledSlide:
@@ -108,6 +110,18 @@ class LabelledSlide:
     def sensor(self) -> str:
         """Name of the sensor of the first topic; '' if no signal was read."""
         return next((batches[0].sensor for batches in self.signals.values() if batches), '')
+
+    def at_rest(self, topic: str) -> Array:
+        """Return the samples before the touch, (n, n_channels); none where the approach was not recorded."""
+        approaching = [one.stamp_ns for one in self.states if one.phase is Phase.APPROACH]
+        touched = [one.stamp_ns for one in self.states if one.phase is not Phase.APPROACH]
+        # The rest ends where the approach does; without an approach the rest is unknown.
+        end_ns = min([at for at in touched if approaching and at > approaching[0]], default=0)
+        until_ns = end_ns - min(TOUCH_NS, (end_ns - approaching[0]) // 2) if end_ns else 0
+        # By sample, not by batch: the batches of a slide are joined, so one holds the rest and the touch.
+        batches = self.signals[topic]
+        counts = [max(0, int((until_ns - one.stamp_ns) * 1e-9 * one.sampling_rate_hz)) for one in batches]
+        return np.concatenate([one.samples[:count] for one, count in zip(batches, counts, strict=True)]).astype(float)
 
 
 def _mean(values: Iterable[float]) -> float:

@@ -74,6 +74,7 @@ def summary(model: TextureModel, out: Path) -> list[str]:
         *_unfit(model),
         *_uneven(slides),
         *training.get('tare', []),
+        *training.get('quiet', []),
         *filter(
             None, [model.acceptance.reason or model.acceptance.decided_reason, model.acceptance.domain.reach_reason]
         ),
