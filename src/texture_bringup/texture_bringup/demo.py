@@ -314,7 +314,7 @@ def draw(slides: Sequence[Slide], path: Path) -> None:
             axis.text(
                 0.0,
                 0.5,
-                'green: accepted\norange: rejected\ngrey: the other surfaces\n\nLines begin with the\nfirst estimate.',
+                'green: accepted\norange: rejected\ngrey: the other surfaces\n\ndotted: before the\nfirst estimate',
                 transform=axis.transAxes,
                 va='center',
             )
@@ -340,6 +340,9 @@ def _draw_slide(axis: Any, slide: Slide) -> None:
         colour = 'lightgrey' if number != best else COLOURS[2] if accepted else COLOURS[5]
         width, above = (2.0, 3) if number == best else (1.0, 2)
         axis.plot(seconds, values, color=colour, marker='.', linewidth=width, zorder=above)
+        # No estimate before the first window: from as probable as any other.
+        before_s, before = (0.0, *seconds[:1]), (1.0 / len(final.probabilities), *values[:1])
+        axis.plot(before_s, before, color=colour, linestyle=':', linewidth=1.0, zorder=above)
     nearest = f'\nnearest: {final.label}' if final.label else ''
     reason = in_words(final.rejection)
     verdict = f'accepted: {final.label}' if accepted else f'rejected: {reason}{nearest}'
