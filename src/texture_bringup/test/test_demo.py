@@ -76,7 +76,7 @@ def test_an_answer_is_as_expected_if_label_and_rejection_are(
     assert Slide('glass', 'glass', expected, answer, []).as_expected is as_expected
 
 
-def test_the_picture_has_no_line_before_the_first_estimate_and_times_below_each_panel(tmp_path, monkeypatch) -> None:
+def test_the_picture_dots_what_is_before_the_first_estimate_and_has_times_below_each_panel(tmp_path, monkeypatch) -> None:
     figure = Figure()
     monkeypatch.setattr(demo, 'chart', lambda *_: nullcontext(figure))
     seen = [
@@ -89,7 +89,8 @@ def test_the_picture_has_no_line_before_the_first_estimate_and_times_below_each_
     )
     demo.draw([slide] * 3, tmp_path / 'demo.png')
     panels = figure.axes[:3]
-    assert [[min(line.get_xdata()) for line in panel.lines] for panel in panels] == [[0.5, 0.5]] * 3
+    begins = [[(line.get_linestyle(), min(line.get_xdata())) for line in panel.lines] for panel in panels]
+    assert begins == [[('-', 0.5), (':', 0.0)] * 2] * 3
     assert all(panel.xaxis.get_tick_params()['labelbottom'] for panel in panels)
 
 
