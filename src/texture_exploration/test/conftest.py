@@ -127,7 +127,8 @@ def explorer(monkeypatch):
         table.pace()
 
     monkeypatch.setattr('texture_exploration.explorer.Pacer', lambda *_: pace)
-    made = Explorer(table.arm, TOUCH, LIMITS, table.on_state, clock=lambda: table.now_ns)
+    watch = {'clock': lambda: table.now_ns, 'signal_fault': lambda listening: table.signal_fault(listening)}
+    made = Explorer(table.arm, TOUCH, LIMITS, table.on_state, **watch)
     made.table = table
     made.connect()
     yield made

@@ -120,6 +120,8 @@ class ExplorerNode(PatientLifecycleNode):
     Configuring checks that the arm answers, activating takes control, deactivating lifts the finger and releases it.
     """
 
+    owns_file = True  # limits in a misnamed section would be ignored
+
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('explorer', **kwargs)
         params = declare(self, ExplorerParams)
