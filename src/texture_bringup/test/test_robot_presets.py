@@ -141,7 +141,9 @@ def test_limits_in_a_section_that_does_not_reach_the_explorer_are_refused_before
     file = tmp_path / 'my_robot.yaml'
     file.write_text(f'/**:\n  ros__parameters: {{}}\n{section}:\n  ros__parameters: {{max_force_n: 4.0}}\n')
     shown = f'/{section.lstrip("/")}'
-    allowed = re.escape(f"has the section '{shown}', which is not for node '/p/explorer'; allowed are /**, /**/explorer,")
+    allowed = re.escape(
+        f"has the section '{shown}', which is not for node '/p/explorer'; allowed are /**, /**/explorer,"
+    )
     with pytest.raises(InvalidParameter, match=allowed):
         read(find_launch_file(robot), {'namespace': 'p', 'explorer_params': str(file)}, os.environ)
 

@@ -159,7 +159,10 @@ def test_a_node_that_owns_its_file_refuses_a_section_that_does_not_reach_it(
     with pytest.raises(SystemExit):
         run(n, ['--ros-args', *words])
     shown = f'/{section.lstrip("/")}'
-    assert f"has the section '{shown}', which is not for node '/p/n'; allowed are /**, /**/n, /p/n: " in capfd.readouterr().err
+    assert (
+        f"has the section '{shown}', which is not for node '/p/n'; allowed are /**, /**/n, /p/n: "
+        in capfd.readouterr().err
+    )
 
 
 @pytest.mark.parametrize('section', ['/**', '/**/n', 'p/n', '/p/n', 'p:\n  n'])

@@ -405,7 +405,7 @@ def check_parameter_file(path: Path, node: str = '') -> None:
         if node and section not in allowed:
             raise InvalidParameter(
                 f"parameter file '{path}' has the section '{section}', which is not for node '{node}'; "
-                f"allowed are {', '.join(allowed)}: correct its name, or remove it"
+                f'allowed are {", ".join(allowed)}: correct its name, or remove it'
             )
 
 
