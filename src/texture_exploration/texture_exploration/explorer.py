@@ -30,6 +30,7 @@ NO_CONTROL = (
     'the explorer has no control of the arm; run `texture activate`, or `ros2 lifecycle set` with configure and '
     'activate'
 )
+CONNECTING = 'the explorer is connecting to the arm'
 GENTLE_N = 1.0  # the force of a finger found in contact is unknown: it rises as before a gentle slide
 
 

@@ -43,7 +43,7 @@ from texture_exploration.presets import load_preset
 
 if TYPE_CHECKING:
     from texture_evaluation import collection
-    from texture_recordings.dataset import LabelledFeatures
+    from texture_features.feature_set import LabelledFeatures
 
 # What evaluates is imported when it runs: `explore` has to begin at once.
 # ruff: noqa: PLC0415

@@ -65,7 +65,7 @@ from texture_exploration.exploration import (
     no_signal_watch,
     refusal,
 )
-from texture_exploration.explorer import Explorer
+from texture_exploration.explorer import CONNECTING, Explorer
 from texture_exploration.guards import Listening, SignalWatch, SignalWatchParams
 from texture_exploration.motions import DEFAULTS, MOTIONS
 from texture_exploration.safety import SafetyLimits, SurfacePatch
@@ -126,6 +126,7 @@ class ExplorerNode(PatientLifecycleNode):
         super().__init__('explorer', **kwargs)
         params = declare(self, ExplorerParams)
         self._estimate_timeout_s, self._autostart = params.estimate_timeout_s, params.autostart
+        self._arm_name = params.arm
         self._surface_frame_id = frame_name(self.get_namespace(), params.surface_frame_id)
         self._explorer = self._make_explorer(params)
         self._transforms = self.create_publisher(TFMessage, '/tf_static', STATIC_QOS)
@@ -442,7 +443,8 @@ class ExplorerNode(PatientLifecycleNode):
 
     def _why_not_ready(self) -> str:
         if not self._active:
-            return 'the explorer is not active: it has no control of the arm'
+            connecting = f"{CONNECTING} '{self._arm_name}'"
+            return connecting if self._autostart else 'the explorer is not active: it has no control of the arm'
         return 'an exploration is running' if self._explorer.current else self._explorer.fault()
 
     def _broadcast_surface(self) -> None:
@@ -481,7 +483,7 @@ class ExplorerNode(PatientLifecycleNode):
             **self._explorer.counts,
         }
         if not self._active:
-            return 'WARN', 'the explorer is not active: it has no control of the arm', numbers
+            return 'WARN', self._why_not_ready(), numbers
         if fault:
             return 'ERROR', fault, numbers
         warning = self._explorer.arm.warning() or ('' if current else self._not_lifted)
