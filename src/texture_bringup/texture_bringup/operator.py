@@ -221,9 +221,7 @@ class Operator:
         self._settings: dict[str, AsyncParameterClient] = {}  # of each node, made once: all nodes remember it
         self._heard_s = 0.0  # of the explorer
         self._info = msg.ExplorerInfo()
-        self._node.create_subscription(
-            msg.ExplorerInfo, 'explorer_info', partial(setattr, self, '_info'), quality_of_service('explorer_info')
-        )
+        self._on_info(partial(setattr, self, '_info'))
         self._states: Any = None  # not subscribed yet: who waits for listeners would count it
         self._vectors: list[FeatureVector] | None = None  # not subscribed yet
 
@@ -274,10 +272,7 @@ class Operator:
     def watch_stops(self) -> Callable[[], bool]:
         """Return what says whether the explorer is told to stop from now on, between explorations, too."""
         ends: list[int] = []
-        quality = quality_of_service('explorer_info')
-        self._node.create_subscription(
-            msg.ExplorerInfo, 'explorer_info', lambda info: ends.append(info.last_error_code), quality
-        )
+        self._on_info(lambda info: ends.append(info.last_error_code))
 
         def stopped() -> bool:
             end_s = time.monotonic() + STEP_S
@@ -510,6 +505,10 @@ class Operator:
         while not accepted.done():
             self.wait_until(lambda: accepted.done() or connects(), ACCEPT_S, silent, MotionAborted)
             self.wait_until(lambda: accepted.done() or not connects(), ANSWER_S, self._info.message, MotionAborted)
+
+    def _on_info(self, take: Callable[[Any], None]) -> None:
+        """Subscribe to what the explorer can do, which is latched."""
+        self._node.create_subscription(msg.ExplorerInfo, 'explorer_info', take, quality_of_service('explorer_info'))
 
     def _hear(self, _state: bytes) -> None:
         self._heard_s = time.monotonic()

@@ -53,7 +53,8 @@ def test_a_fault_in_a_users_planner_is_told_with_its_file_and_line(explorer, tmp
 
 
 @pytest.mark.parametrize(
-    'limits', [SafetyLimits(x_low_m=0.05), SafetyLimits(y_high_m=-0.02), SafetyLimits(z_low_m=0.05)]
+    'limits',
+    [SafetyLimits(x_low_m=0.05), SafetyLimits(y_high_m=-0.02), SafetyLimits(z_low_m=0.05, surface_tolerance_m=0.06)],
 )
 def test_a_motion_that_would_begin_outside_the_workspace_is_refused(explorer, limits):
     """Beyond a limit no crossing of it is seen: a wrong pose of the surface would switch the workspace off."""

@@ -65,7 +65,7 @@ from texture_exploration.exploration import (
     no_signal_watch,
     refusal,
 )
-from texture_exploration.explorer import CONNECTING, Explorer
+from texture_exploration.explorer import CONNECTING, NO_CONTROL, Explorer
 from texture_exploration.guards import Listening, SignalWatch, SignalWatchParams
 from texture_exploration.motions import DEFAULTS, MOTIONS
 from texture_exploration.safety import SafetyLimits, SurfacePatch
@@ -126,7 +126,6 @@ class ExplorerNode(PatientLifecycleNode):
         super().__init__('explorer', **kwargs)
         params = declare(self, ExplorerParams)
         self._estimate_timeout_s, self._autostart = params.estimate_timeout_s, params.autostart
-        self._arm_name = params.arm
         self._surface_frame_id = frame_name(self.get_namespace(), params.surface_frame_id)
         self._explorer = self._make_explorer(params)
         self._transforms = self.create_publisher(TFMessage, '/tf_static', STATIC_QOS)
@@ -443,8 +442,7 @@ class ExplorerNode(PatientLifecycleNode):
 
     def _why_not_ready(self) -> str:
         if not self._active:
-            connecting = f"{CONNECTING} '{self._arm_name}'"
-            return connecting if self._autostart else 'the explorer is not active: it has no control of the arm'
+            return f"{CONNECTING} '{self.get_parameter('arm').value}'" if self._autostart else NO_CONTROL
         return 'an exploration is running' if self._explorer.current else self._explorer.fault()
 
     def _broadcast_surface(self) -> None:
