@@ -14,7 +14,14 @@ import pytest
 from texture_bringup.command import main
 from texture_bringup.commands import explore
 from texture_bringup.operator import ExplorationResult
-from texture_core.errors import CollectionError, ExplorationError, InvalidData, InvalidParameter, LaunchFailed
+from texture_core.errors import (
+    CollectionError,
+    ExplorationError,
+    InvalidData,
+    InvalidParameter,
+    LaunchFailed,
+    TextureError,
+)
 from texture_core.types import RoughnessEstimate, TextureEstimate
 from texture_evaluation.collection import CollectionEnd, CollectionParams, PlaceAccuracy
 from texture_recordings.bags import BagWriter, read_bag
@@ -110,6 +117,27 @@ def test_touches_begin_when_the_recorder_writes_what_the_nodes_send(two_surfaces
         writer.flush()
         assert explore.records(bag, lambda: None) == complete
     writer.close()
+
+
+@pytest.mark.parametrize(
+    ('topics', 'sentence'),
+    [
+        (('/exploration', '/p/exploration'), 'has the namespaces /, /p'),
+        (('/exploration',), "has no 'signal', only states"),
+    ],
+)
+def test_a_bag_in_the_folder_that_cannot_be_used_is_refused_before_the_robot_moves(
+    collected, two_surfaces: Path, tmp_path: Path, topics, sentence
+) -> None:
+    writer, [recorded, _] = BagWriter(tmp_path / 'glass'), sorted((two_surfaces / 'bags').iterdir())
+    for _, time_ns, state in read_bag(recorded, ('exploration',)):
+        for topic in topics:
+            writer.write(topic, state, time_ns)
+    writer.close()
+    explorer = Explorer(DONE)
+    with pytest.raises(TextureError, match=sentence):
+        collected(explorer)
+    assert not explorer.requests
 
 
 DONE = ExplorationError.NONE, 'id'

@@ -18,9 +18,10 @@ from texture_msgs import action, msg
 from texture_bringup import operator as operators
 from texture_bringup.feed import Feed
 from texture_core.errors import LaunchFailed, MotionAborted, MotionRefused
-from texture_core.ros import STATE_QOS, to_msg
+from texture_core.ros import STATE_QOS, quality_of_service, to_msg
 from texture_core.ros_testing import LocalGraph
 from texture_core.types import ExplorationRequest, ExplorationState, Phase
+from texture_exploration.explorer import CONNECTING
 
 # An explorer that answers at the end finds nobody there any more.
 pytestmark = [pytest.mark.realtime, pytest.mark.ros, pytest.mark.filterwarnings('ignore:failed to send response')]
@@ -206,6 +207,24 @@ def test_ctrl_c_ends_the_program_behind_what_rclpy_does_and_not_within():
         signal.signal(signal.SIGINT, before)
 
 
+def test_an_explorer_that_connects_to_its_arm_is_waited_for_and_the_wait_says_so(monkeypatch):
+    said = []
+    monkeypatch.setattr(operators, 'task', lambda what, **_: said.append(what) or nullcontext())
+    monkeypatch.setattr(operators, 'ACCEPT_S', 0.5)
+    monkeypatch.setattr(operators, 'CANCEL_DEADLINE_S', 0.5)
+    begin, waited_s = threading.Event(), 3.0
+    with LocalGraph(DOMAIN) as graph, silent_explorer(begin=begin), operators.Operator(domain_id=DOMAIN) as operator:
+        infos = graph.peer.create_publisher(msg.ExplorerInfo, 'explorer_info', quality_of_service('explorer_info'))
+        infos.publish(msg.ExplorerInfo(message=f"{CONNECTING} 'ur'"))
+        operator.wait_for_explorer(30.0)
+        threading.Timer(waited_s, begin.set).start()
+        begin_s = time.monotonic()
+        with pytest.raises(MotionAborted, match='no result within the timeout'):  # it was accepted
+            operator.explore(ExplorationRequest('linear_slide', timeout_s=0.2))
+        assert time.monotonic() - begin_s > waited_s
+    assert said[-1] == "waiting: the explorer is connecting to the arm 'ur'"
+
+
 def test_advice_is_shown_after_a_timeout_only(monkeypatch):
     said = []
     monkeypatch.setattr(operators, 'task', lambda what, **_: said.append(what) or nullcontext())
@@ -213,8 +232,8 @@ def test_advice_is_shown_after_a_timeout_only(monkeypatch):
     begin = threading.Event()
     with silent_explorer(begin=begin), operators.Operator(domain_id=DOMAIN) as operator:
         operator.wait_for_explorer(30.0)
-        with pytest.raises(MotionAborted, match=r'is not ready yet, .*; stop it, and check that no second one runs'):
+        with pytest.raises(MotionAborted, match=r'has not answered yet; stop it, and check that no second one runs'):
             operator.explore(ExplorationRequest('linear_slide'))
         begin.set()
     assert said[0] == "waiting for an explorer in the namespace '/', which may be starting"
-    assert said[-1] == 'waiting: the explorer is not ready yet, it may be connecting to the arm'
+    assert said[-1] == 'waiting: the explorer has not answered yet'

@@ -13,7 +13,7 @@ import yaml
 from texture_bringup.launcher import find_launch_file, read
 from texture_core import config as resources
 from texture_core.config import parameters_of
-from texture_core.errors import InvalidLaunch
+from texture_core.errors import InvalidLaunch, InvalidParameter
 from texture_drivers.sensor import BatchParams
 from texture_exploration.arms.arm import SurfacePoseParams
 from texture_exploration.arms.in_hand import InHandParams
@@ -131,6 +131,21 @@ def test_a_parameter_file_of_the_explorer_has_the_last_word(robot, tmp_path):
     nodes = read(find_launch_file(robot), {'explorer_params': str(file)}, {})
     explorer = next(node for node in nodes if node.executable == 'explorer')
     assert explorer.parameters[-1] == file
+
+
+@pytest.mark.parametrize('robot', ['emulator', *ROBOTS])
+@pytest.mark.parametrize('section', ['/**/explorr', 'explorer', '/**/classifier'])
+def test_limits_in_a_section_that_does_not_reach_the_explorer_are_refused_before_anything_starts(
+    robot, section, tmp_path
+):
+    file = tmp_path / 'my_robot.yaml'
+    file.write_text(f'/**:\n  ros__parameters: {{}}\n{section}:\n  ros__parameters: {{max_force_n: 4.0}}\n')
+    shown = f'/{section.lstrip("/")}'
+    allowed = re.escape(
+        f"has the section '{shown}', which is not for node '/p/explorer'; allowed are /**, /**/explorer,"
+    )
+    with pytest.raises(InvalidParameter, match=allowed):
+        read(find_launch_file(robot), {'namespace': 'p', 'explorer_params': str(file)}, os.environ)
 
 
 @pytest.mark.parametrize(

@@ -246,7 +246,8 @@ def ending(returncode: int) -> str:
     return f'was killed by {names.get(-returncode, f"signal {-returncode}")}'
 
 
-# An explorer that was killed or failed lifts no finger.
+EXPLORER = 'explorer'  # the program whose parameter files are for it alone
+# One that was killed or failed lifts no finger.
 PRESSES = 'the arm may continue to press: raise the finger by freedrive or pendant before you launch again'
 
 
@@ -350,7 +351,7 @@ class Supervisor:
         needed = node.needed or node.respawn or (self._together and code != 0)
         if code != 0 and not (stopping or restart):
             self._code = MISTAKE if code == MISTAKE and needed else 1
-        pressing = f'; {PRESSES}' * (node.executable == 'explorer' and code not in (0, MISTAKE))
+        pressing = f'; {PRESSES}' * (node.executable == EXPLORER and code not in (0, MISTAKE))
         self._say(f'[launch] {node.label} {ending(code)}{pressing}')
         if restart:
             self._due.append((time.monotonic() + node.respawn_delay_s, node, process.deaths + 1))
@@ -632,6 +633,7 @@ class _Reader:
         if (on_exit := texts.get('on_exit', 'shutdown')) != 'shutdown':
             raise InvalidLaunch(f"'on_exit' of <node> is '{on_exit}'; allowed is shutdown")
         namespace = joined_namespace(self._namespace, texts.get('namespace', ''))
+        owner = f'{namespace.rstrip("/")}/{texts.get("name", EXPLORER)}' if texts.get('exec') == EXPLORER else ''
         types = ('bool', 'float', 'int')
         respawn, delay_s, retries = (
             typed(texts.get(name, usual), kind, f"'{name}' of <node>")
@@ -643,7 +645,7 @@ class _Reader:
                 executable=self.text(element, 'exec'),
                 name=texts.get('name', ''),
                 namespace=namespace or '/' * ('namespace' in texts),
-                parameters=tuple(self._parameter(item) for item in element.findall('param')),
+                parameters=tuple(self._parameter(item, owner) for item in element.findall('param')),
                 remappings=tuple((self.text(item, 'from'), self.text(item, 'to')) for item in element.findall('remap')),
                 respawn=respawn,
                 respawn_delay_s=delay_s,
@@ -653,8 +655,8 @@ class _Reader:
             )
         )
 
-    def _parameter(self, element: Element) -> Path | dict[str, Any]:
-        """Return a parameter file, or a name with its value."""
+    def _parameter(self, element: Element, owner: str) -> Path | dict[str, Any]:
+        """Return a parameter file, of the node `owner` alone if that is not '', or a name with its value."""
         if 'from' not in element.attrib:
             name, kind = self.text(element, 'name'), element.get('type', 'yaml')
             return {name: typed(self.text(element, 'value'), kind, f"the value of <param name='{name}'>")}
@@ -665,5 +667,5 @@ class _Reader:
             if path.parts[-4:-1] == ('texture_bringup', 'config', 'robots'):
                 raise unknown_name(path.stem, [item.stem for item in path.parent.glob('*.yaml')], 'preset')
             raise InvalidLaunch(f"there is no parameter file '{path}'; give the path of one")
-        check_parameter_file(path)
+        check_parameter_file(path, owner)
         return path

@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import Any
 from uuid import uuid4
@@ -54,6 +55,7 @@ from texture_core.types import (
     RoughnessEstimate,
     TextureEstimate,
 )
+from texture_exploration.explorer import CONNECTING
 
 
 @contextmanager
@@ -218,6 +220,8 @@ class Operator:
         self._explore = ActionClient(self._node, action.Explore, 'explore')
         self._settings: dict[str, AsyncParameterClient] = {}  # of each node, made once: all nodes remember it
         self._heard_s = 0.0  # of the explorer
+        self._info = msg.ExplorerInfo()
+        self._on_info(partial(setattr, self, '_info'))
         self._states: Any = None  # not subscribed yet: who waits for listeners would count it
         self._vectors: list[FeatureVector] | None = None  # not subscribed yet
 
@@ -268,10 +272,7 @@ class Operator:
     def watch_stops(self) -> Callable[[], bool]:
         """Return what says whether the explorer is told to stop from now on, between explorations, too."""
         ends: list[int] = []
-        quality = quality_of_service('explorer_info')
-        self._node.create_subscription(
-            msg.ExplorerInfo, 'explorer_info', lambda info: ends.append(info.last_error_code), quality
-        )
+        self._on_info(lambda info: ends.append(info.last_error_code))
 
         def stopped() -> bool:
             end_s = time.monotonic() + STEP_S
@@ -303,11 +304,8 @@ class Operator:
         if stopped():
             raise MotionRefused('the request was stopped before it was sent', ExplorationError.STOPPED)
         accepted = self._explore.send_goal_async(action.Explore.Goal(request=to_msg(request)), on_feedback, goal_id)
-        silent = (
-            'the explorer is not ready yet, it may be connecting to the arm; stop it, and check that no second one runs'
-        )
         try:
-            self.wait_until(accepted.done, ACCEPT_S, silent, MotionAborted)
+            self._wait_until_accepted(accepted)
         except MotionAborted as error:
             withdrawn = self._withdraw(goal_id)
             self._complete(withdrawn, CONFIRM_S)
@@ -496,6 +494,21 @@ class Operator:
         """Return the answer of a node that may run without an explorer."""
         self.wait_until(future.done, ANSWER_S, f"node '{node}' has not answered yet")
         return future.result()
+
+    def _wait_until_accepted(self, accepted: Future) -> None:
+        """Wait for the answer to a request, and first until the explorer has connected to its arm."""
+
+        def connects() -> bool:
+            return bool(self._info.message.startswith(CONNECTING))
+
+        silent = 'the explorer has not answered yet; stop it, and check that no second one runs'
+        while not accepted.done():
+            self.wait_until(lambda: accepted.done() or connects(), ACCEPT_S, silent, MotionAborted)
+            self.wait_until(lambda: accepted.done() or not connects(), ANSWER_S, self._info.message, MotionAborted)
+
+    def _on_info(self, take: Callable[[Any], None]) -> None:
+        """Subscribe to what the explorer can do, which is latched."""
+        self._node.create_subscription(msg.ExplorerInfo, 'explorer_info', take, quality_of_service('explorer_info'))
 
     def _hear(self, _state: bytes) -> None:
         self._heard_s = time.monotonic()

@@ -52,7 +52,7 @@ def test_a_stop_while_a_node_imports_ends_it_with_0_and_without_a_traceback(numb
         (['oak', '--speed', 'fast'], "--speed is 'fast'; a number is needed: speed, 5 % at least"),
         (['oak', '--jobs', '0'], "--jobs is '0'; 0 cores compute nothing; 1 or more are needed, or -1 for all"),
         (['oak', '--kind', 'liner'], "no value of --kind 'liner'; did you mean 'linear'? Known: circular, linear"),
-        (['oak', '--speed'], '--speed: expected one argument; write touch [-h] [--speed M/S]'),
+        (['oak', '--speed'], '--speed expected one argument; write --speed M/S'),
         (['oak', '--namespace', 'le ft'], "the namespace is 'le ft'; allowed are letters, digits and _"),
         (['oak', 'elm'], "'elm' is one argument too many; write touch [-h] [--speed M/S]"),
         ([], 'the following arguments are required: surface; write touch [-h] [--speed M/S]'),

@@ -145,6 +145,42 @@ def test_a_file_with_a_wrong_layout_is_refused_in_one_sentence(tmp_path: Path, c
         check_parameter_file(Path(words[1]))
 
 
+@pytest.mark.parametrize('section', ['/**/nn', 'n', '/q/n', '/*/n'])
+def test_a_node_that_owns_its_file_refuses_a_section_that_does_not_reach_it(
+    tmp_path: Path, capfd: Any, section: str
+) -> None:
+    words = write(tmp_path / 'robot.yaml', f'{PRESET}{section}:\n  ros__parameters: {{length_s: 3.0}}\n')
+
+    def n() -> Any:
+        node = rclpy.create_node('n', namespace='p')
+        node.owns_file = True
+        return declare(node, Params)
+
+    with pytest.raises(SystemExit):
+        run(n, ['--ros-args', *words])
+    shown = f'/{section.lstrip("/")}'
+    assert (
+        f"has the section '{shown}', which is not for node '/p/n'; allowed are /**, /**/n, /p/n: "
+        in capfd.readouterr().err
+    )
+
+
+@pytest.mark.parametrize('section', ['/**', '/**/n', 'p/n', '/p/n', 'p:\n  n'])
+def test_a_node_that_owns_its_file_takes_each_section_that_reaches_it(tmp_path: Path, section: str) -> None:
+    words = write(tmp_path / 'robot.yaml', f'{section}:\n    ros__parameters: {{length_s: 3.0}}\n')
+    taken = []
+
+    def n() -> Any:
+        node = rclpy.create_node('n', namespace='p')
+        node.owns_file = True
+        taken.append(declare(node, Params))
+        raise InvalidParameter('enough')
+
+    with pytest.raises(SystemExit):
+        run(n, ['--ros-args', *words])
+    assert taken == [Params(length_s=3.0)]
+
+
 @pytest.mark.parametrize('section', ['/**', '/n', '/**/n'])
 def test_a_node_with_a_misspelled_parameter_does_not_start(tmp_path: Any, capfd: Any, section: str) -> None:
     file = tmp_path / 'robot.yaml'

@@ -47,7 +47,11 @@ class Parser(argparse.ArgumentParser):
         return options
 
     def error(self, message: str) -> NoReturn:
-        """Refuse what argparse refuses, such as a missing argument."""
+        """Refuse what argparse refuses, such as a missing argument; of an option, only its form is shown."""
+        name, _, fault = message.removeprefix('argument ').partition(': ')
+        if action := self._option_string_actions.get(name.partition('/')[0]):
+            form = self._get_formatter()._format_action_invocation(action)
+            raise InvalidParameter(f'{name} {fault}; write {form}')
         raise InvalidParameter(f'{message.removeprefix("argument ")}; {self._usage()}')
 
     def _usage(self) -> str:

@@ -396,22 +396,29 @@ PARAMETER_FILE = (
 )
 
 
-def check_parameter_file(path: Path) -> None:
-    """Refuse a file that ROS cannot read as parameters of nodes."""
+def check_parameter_file(path: Path, node: str = '') -> None:
+    """Refuse a file that ROS cannot read as parameters of nodes; given a full name, also a section of another node."""
 
-    def fits(section: Any) -> bool:
-        if not isinstance(section, Mapping):
-            return False
-        if 'ros__parameters' in section:
-            return isinstance(section['ros__parameters'], Mapping)
-        return all(map(fits, section.values()))
+    def sections(content: Mapping[Any, Any], above: str = '') -> Iterator[str]:
+        for name, section in content.items():
+            if not isinstance(section, Mapping):
+                raise InvalidParameter(f"parameter file '{path}' gives no parameters to a node; {PARAMETER_FILE}")
+            if name == 'ros__parameters':
+                yield above
+            else:
+                yield from sections(section, f'{above}/{str(name).strip("/")}'.rstrip('/'))
 
     try:
         content = load_yaml(path, 'parameter file')
     except InvalidParameter as error:
         raise InvalidParameter(f'{" ".join(str(error).split())}; {PARAMETER_FILE}') from error
-    if content is not None and not fits(content):
-        raise InvalidParameter(f"parameter file '{path}' gives no parameters to a node; {PARAMETER_FILE}")
+    allowed = ('/**', f'/**/{node.rpartition("/")[2]}', node)
+    for section in sections({} if content is None else {'': content}):
+        if node and section not in allowed:
+            raise InvalidParameter(
+                f"parameter file '{path}' has the section '{section}', which is not for node '{node}'; "
+                f'allowed are {", ".join(allowed)}: correct its name, or remove it'
+            )
 
 
 def load_card(path: Path) -> Any:

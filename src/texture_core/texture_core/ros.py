@@ -181,6 +181,8 @@ def _given(node: Any) -> list[tuple[str, Mapping[str, RosParameter]]]:
     """
     given = []
     for option, text in _SOURCES:
+        if option == '--params-file' and getattr(node, 'owns_file', False):
+            check_parameter_file(Path(text), node.get_fully_qualified_name())
         with node.context.handle:
             alone = rclpy_implementation.Node(
                 node.get_name(), node.get_namespace(), node.context.handle, ['--ros-args', option, text], False, False
@@ -222,6 +224,7 @@ def check_names(node: Any) -> None:
 
     Names in the node's `names_elsewhere`, if it has them, belong to alternatives that it did not choose.
     A node with `shares_file` reads only its parameters from the file of another node, such as the pose of a surface.
+    One with `owns_file` refuses a file with a section for another node: a misnamed section would have no effect.
     """
     if getattr(node, 'shares_file', False):
         return
@@ -234,7 +237,7 @@ def check_names(node: Any) -> None:
         if near and name not in elsewhere:
             raise InvalidParameter(
                 f"node '{node.get_name()}' has no parameter '{name}'; did you mean '{near[0]}'? Correct the name, or, "
-                'if it belongs to another node, give it in the section of that node'
+                'if it belongs to another node, give it to that one'
             )
         node.get_logger().warning(f'this has no effect: {unknown_name(name, declared, "parameter")}')
         del node._parameter_overrides[name]  # said once

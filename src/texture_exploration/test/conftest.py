@@ -127,7 +127,11 @@ def explorer(monkeypatch):
         table.pace()
 
     monkeypatch.setattr('texture_exploration.explorer.Pacer', lambda *_: pace)
-    made = Explorer(table.arm, TOUCH, LIMITS, table.on_state, clock=lambda: table.now_ns)
+
+    def signal_fault(listening):
+        return table.signal_fault(listening)  # of the test
+
+    made = Explorer(table.arm, TOUCH, LIMITS, table.on_state, clock=lambda: table.now_ns, signal_fault=signal_fault)
     made.table = table
     made.connect()
     yield made

@@ -1,6 +1,5 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-import math
 import re
 from collections import deque
 from dataclasses import replace
@@ -167,34 +166,6 @@ def test_a_sensor_that_falls_silent_lifts_the_finger_within_150_ms(table, phase)
     if phase is not Phase.LIFT:
         lifted_ns = next(s.stamp_ns for s in table.states if s.phase is Phase.LIFT)
         assert (lifted_ns - fell_silent[0]) * 1e-9 == pytest.approx(0.12, abs=0.02)
-
-
-@pytest.mark.parametrize(
-    ('first_sample_s', 'stop_s', 'message'),
-    [
-        (0.3, math.inf, 'the motion was completed'),
-        (math.inf, math.inf, "no samples on 'signal' for 5"),
-        (math.inf, 0.1, 'stopped on request'),
-    ],
-    ids=['a late one', 'none', 'none, and a stop'],
-)
-def test_the_finger_rests_until_the_first_sample(table, first_sample_s, stop_s, message):
-    watch = SignalWatch(0.5, lambda: table.now_ns)
-    table.signal_fault = watch.signal_fault
-    start_ns, seen = table.now_ns, []
-
-    def look():
-        time_s = (table.now_ns - start_ns) * 1e-9
-        if time_s >= first_sample_s:
-            watch.on_samples()
-        seen.append((time_s, table.arm.state().position[2] - table.home[2]))
-        if time_s >= stop_s:
-            table.exploration.stop('stopped on request')
-
-    table.at_each_step = look
-    assert table.explore().message.startswith(message)
-    assert min(height for time_s, height in seen if time_s <= first_sample_s) == 0.0
-    assert (Phase.APPROACH in table.phases) is math.isfinite(first_sample_s)
 
 
 def test_a_machine_that_slept_does_not_take_the_sensor_for_silent(table):

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 import importlib
+import math
 import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
@@ -12,6 +13,7 @@ from texture_core.errors import DeviceError, ExplorationError, MotionRefused, Un
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.simulated import SimulatedArm
 from texture_exploration.explorer import Explorer
+from texture_exploration.guards import SignalWatch
 from texture_exploration.safety import SafetyLimits, SurfacePatch
 from texture_exploration.touch import TouchParams
 
@@ -51,7 +53,8 @@ def test_a_fault_in_a_users_planner_is_told_with_its_file_and_line(explorer, tmp
 
 
 @pytest.mark.parametrize(
-    'limits', [SafetyLimits(x_low_m=0.05), SafetyLimits(y_high_m=-0.02), SafetyLimits(z_low_m=0.05)]
+    'limits',
+    [SafetyLimits(x_low_m=0.05), SafetyLimits(y_high_m=-0.02), SafetyLimits(z_low_m=0.05, surface_tolerance_m=0.06)],
 )
 def test_a_motion_that_would_begin_outside_the_workspace_is_refused(explorer, limits):
     """Beyond a limit no crossing of it is seen: a wrong pose of the surface would switch the workspace off."""
@@ -119,6 +122,39 @@ def test_a_request_that_is_stopped_or_cancelled_while_it_waits_or_is_prepared_mo
         assert [one.exception(60.0).error for one in asked] == ends
     assert (explorer.table.states, explorer.current) == ([], None)
     assert explorer.begin('three', QUICK).ended.wait(DEADLINE_S)
+
+
+@pytest.mark.parametrize(
+    ('first_sample_s', 'stop_s', 'message'),
+    [
+        (0.3, math.inf, ''),
+        (math.inf, math.inf, "no samples on 'signal' for 5"),
+        (math.inf, 0.1, 'the request was stopped before anything moved'),
+    ],
+    ids=['a late one', 'none', 'none, and a stop'],
+)
+def test_nothing_moves_before_the_first_sample(explorer, first_sample_s, stop_s, message):
+    table, watch = explorer.table, SignalWatch(0.5, lambda: explorer.table.now_ns)
+    table.signal_fault = watch.signal_fault
+    start_ns, home_m, seen = table.now_ns, explorer.arm.state().position, []
+
+    def look():
+        time_s = (table.now_ns - start_ns) * 1e-9
+        if time_s >= first_sample_s:
+            watch.on_samples()
+        seen.append((time_s, explorer.arm.state().position))
+        if time_s >= stop_s:
+            explorer.stop('enough')
+
+    table.at_each_step = look
+    if message:
+        with pytest.raises(MotionRefused, match=message):
+            explorer.begin('one', QUICK)
+    else:
+        exploration = explorer.begin('one', QUICK)
+        assert exploration.ended.wait(DEADLINE_S)
+        assert exploration.outcome.success, exploration.outcome.message
+    assert {place_m for time_s, place_m in seen if time_s < first_sample_s} == {home_m}
 
 
 def test_an_arm_that_failed_is_connected_again_by_the_next_request(explorer):

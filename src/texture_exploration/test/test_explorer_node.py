@@ -22,7 +22,7 @@ from texture_msgs import msg, srv
 from tf2_msgs.msg import TFMessage
 
 from texture_core.errors import DeviceError, ExplorationError, InvalidParameter
-from texture_core.ros import ESTIMATE_QOS, SENSOR_QOS, STATE_QOS, check_names, to_msg, to_ns
+from texture_core.ros import ESTIMATE_QOS, SENSOR_QOS, STATE_QOS, check_names, quality_of_service, to_msg, to_ns
 from texture_core.ros_testing import LocalGraph, NodeProcess
 from texture_core.types import FingerReceiver, Phase, Rejection, TextureEstimate, quaternion_matrix
 from texture_exploration.arms.arm import SurfaceFrame
@@ -161,6 +161,24 @@ def test_a_request_that_cannot_be_meant_is_refused_before_anything_moves(world, 
     # Numbers that nobody knows are NaN, not the zeros of a new message.
     unknown = response.texture.confidence, response.roughness.grade, response.roughness.grade_std
     assert all(map(math.isnan, unknown))
+
+
+def test_while_it_connects_it_says_to_which_arm(make_world, graph, monkeypatch):
+    infos, connect = (
+        graph.listen(msg.ExplorerInfo, 'explorer_info', quality_of_service('explorer_info')),
+        SimulatedArm.connect,
+    )
+    told = []
+
+    def slow(arm):
+        graph.until(lambda: infos)
+        told.append((infos[-1].ready, infos[-1].message))
+        return connect(arm)
+
+    monkeypatch.setattr(SimulatedArm, 'connect', slow)
+    world = make_world()
+    assert told == [(False, "the explorer is connecting to the arm 'simulated'")]
+    world.until(lambda: infos[-1].ready)
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,7 @@ def test_a_workspace_turned_inside_out_is_refused():
     ('values', 'sentence'),
     [
         ({'min_force_n': 9.0, 'max_force_n': 8.0}, "'min_force_n' is 9; it must be below 'max_force_n', 8 N"),
+        ({'z_low_m': 0.03}, "'z_low_m' is 0.03; it must be below 'surface_tolerance_m', 0.02 m"),
         ({'force_limit_n': 5.0}, "'max_force_n' is 6; it must be below 'force_limit_n', 5 N"),
     ],
 )

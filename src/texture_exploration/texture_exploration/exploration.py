@@ -125,7 +125,6 @@ class Exploration:
         self._stop: tuple[ExplorationError, str] | None = None
         self._finish_reason = ''
         self._abort: tuple[ExplorationError, str] | None = None  # the first reason counts
-        self._signal_seen = False
         self._slid = False
         self._entered = False  # the workspace
         self._next_state_ns = 0
@@ -209,11 +208,6 @@ class Exploration:
         if reason:
             self._abort = self._abort or reason
             self._motion.abort(reason[1])
-        # The finger rests until the sensor delivers; silence from before the request counts.
-        self._signal_seen = self._signal_seen or bool(self._abort) or not self._signal_fault(WITHOUT_GAPS)
-        if not self._signal_seen:
-            self._arm.command(ArmCommand())
-            return False
         if self._finish_reason:
             self._motion.finish(self._finish_reason)
         step = self._motion.step(now_ns, arm)

@@ -16,7 +16,7 @@ from texture_core.errors import DeviceError, ExplorationError, InvalidData, Moti
 from texture_core.types import ExplorationRequest, ExplorationState
 from texture_exploration.arms.arm import POSE, Arm, SurfaceFrame, Vector
 from texture_exploration.exploration import Exploration, arm_fault, no_signal_watch
-from texture_exploration.guards import Listening, sound
+from texture_exploration.guards import WITHOUT_GAPS, Listening, sound
 from texture_exploration.lift_first import Rise
 from texture_exploration.motion import Planner
 from texture_exploration.motions import MOTIONS
@@ -30,6 +30,7 @@ NO_CONTROL = (
     'the explorer has no control of the arm; run `texture activate`, or `ros2 lifecycle set` with configure and '
     'activate'
 )
+CONNECTING = 'the explorer is connecting to the arm'
 GENTLE_N = 1.0  # the force of a finger found in contact is unknown: it rises as before a gentle slide
 
 
@@ -274,6 +275,7 @@ class Explorer:
             if self._zero_n is None or self.arm.zeroed:
                 self._zero_n = self.arm.state().force_vector_n
             motion.lift_first(lambda: self.arm.zeroed, self._zero_n)
+        self._wait_for_signal()
         return Exploration(
             exploration_id,
             request,
@@ -294,6 +296,14 @@ class Explorer:
                 'control again, or correct the pose of the surface or the limits',
                 ExplorationError.OUTSIDE_WORKSPACE,
             )
+
+    def _wait_for_signal(self) -> None:
+        """Refuse to move before samples arrive; a sensor that has just been found is waited for."""
+        listening, pace = Listening(self.clock()), Pacer(PERIOD_S, self.clock)
+        while self._signal_fault(WITHOUT_GAPS) and self._stopped_ns <= listening.since_ns:
+            if silent := self._signal_fault(listening):
+                raise MotionRefused(f'{silent}; nothing has moved', ExplorationError.NO_SIGNAL)
+            pace()
 
     def _check_idle(self) -> None:
         if self._refuses:

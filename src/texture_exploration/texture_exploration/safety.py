@@ -34,6 +34,7 @@ RANGES: Mapping[str, tuple[float | str, float | str, str]] = {
 # Limits of which the first must be below the second.
 ORDERED = (
     *((f'{axis}_low_m', f'{axis}_high_m', 'm') for axis in 'xyz'),
+    ('z_low_m', 'surface_tolerance_m', 'm'),  # else every contact is outside
     ('min_force_n', 'max_force_n', 'N'),
     ('max_force_n', 'force_limit_n', 'N'),
 )

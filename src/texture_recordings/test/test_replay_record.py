@@ -133,6 +133,31 @@ def test_streams_of_other_names_transforms_and_logs_are_recorded_and_with_all_ev
     assert all(log_ns > began_ns for _, log_ns, _ in read_bag(out))  # the time of this machine
 
 
+def test_beside_another_explorer_below_only_the_own_fingers_are_recorded(tmp_path) -> None:
+    batch = to_msg(TactileSignal(5, 's', ('a',), (), 1000.0, 0, np.zeros((10, 1), dtype=np.float32)))
+    given = {'out': str(tmp_path / 'bag'), 'signal_topics': 'signal finger1/signal'}
+
+    def topics() -> set[str]:
+        try:
+            return {message.topic for message in read_foreign(tmp_path / 'bag', lambda _: True)}
+        except InvalidData:
+            return set()  # nothing has come to the disk yet
+
+    with LocalGraph(100, deadline_s=60.0) as graph:
+        names = ('p/signal', 'p/finger1/signal', 'signal', 'finger1/signal')
+        publishers = [graph.peer.create_publisher(msg.TactileSignal, name, SENSOR_QOS) for name in names]
+
+        def is_written() -> bool:
+            for publisher in publishers:
+                publisher.publish(batch)
+            return {'/signal', '/finger1/signal'} <= topics()
+
+        with NodeProcess('texture_recordings', 'record', given, domain_id=100) as record:
+            graph.until(is_written)
+            assert record.stop(signal.SIGINT) == 0, record.output
+    assert {name for name in topics() if name.endswith('signal')} == {'/signal', '/finger1/signal'}
+
+
 @pytest.mark.parametrize(
     ('name', 'parameters', 'sentence'),
     [

@@ -43,6 +43,7 @@ from texture_exploration.presets import load_preset
 
 if TYPE_CHECKING:
     from texture_evaluation import collection
+    from texture_features.feature_set import LabelledFeatures
 
 # What evaluates is imported when it runs: `explore` has to begin at once.
 # ruff: noqa: PLC0415
@@ -300,6 +301,7 @@ def collect_surface(
     A bag without any slide is removed; then None is returned instead.
     """
     from texture_evaluation import collection
+    from texture_recordings.bags import is_bag
 
     low_x, high_x, low_y, high_y, low_n, high_n, high_m_s = operator.parameters('explorer', (*PATCH, *LIMITS))
     if not (low_x < high_x and low_y < high_y):
@@ -310,6 +312,8 @@ def collect_surface(
     patch = collection.Patch(low_x, high_x, low_y, high_y)
     plan = collection.PlacePlan(surface, params, patch, (low_n, high_n), (LEAST_SPEED_M_S, high_m_s))
     folder.mkdir(parents=True, exist_ok=True)
+    if any(map(is_bag, folder.iterdir())):
+        _features_of(folder)  # refused before the robot moves
     bag = folder / collection.next_bag([one.name for one in folder.iterdir()], surface)
     made, losses = 0, ''
     end = collection.CollectionEnd(CollectionError.CANCELLED, 'stopped', 0)  # by Ctrl-C while the recorder starts
@@ -360,13 +364,18 @@ def _print_progress(sentence: str, slides: int) -> None:
 def _evaluate_bag(bag: Path, surface: str, _slides: int) -> collection.PlaceAccuracy:
     """Evaluate all bags of the folder of a bag."""
     from texture_evaluation.collection import evaluate_places
+
+    with unfinished_bags():
+        return evaluate_places(_features_of(bag.parent), surface)
+
+
+def _features_of(folder: Path) -> LabelledFeatures:
+    """Return the features of the slides in all bags of a folder."""
     from texture_features.feature_set import FeatureSet
     from texture_recordings.dataset import SlideDataset
 
     feature_set = FeatureSet.load(RECIPE)
-    with unfinished_bags():
-        dataset = SlideDataset.from_bags([bag.parent], topics=feature_set.topics)
-    return evaluate_places(dataset.features(feature_set), surface)
+    return SlideDataset.from_bags([folder], topics=feature_set.topics).features(feature_set)
 
 
 @contextmanager
@@ -384,8 +393,9 @@ class RecorderProcess(Child):
 
     called = 'the recorder'
 
-    def __init__(self, bag: Path, namespace: str, log: Path) -> None:
-        super().__init__(['record', str(bag), '--namespace', namespace], os.environ, log)
+    def __init__(self, bag: Path, namespace: str, log: Path, signal_topics: str = 'signal') -> None:
+        given = ['record', str(bag), '--namespace', namespace, '--signal-topics', signal_topics]
+        super().__init__(given, os.environ, log)
 
     def check(self) -> None:
         """Raise InvalidData if it has ended."""
@@ -410,8 +420,12 @@ class RecorderProcess(Child):
 
 @contextmanager
 def recorder(operator: Operator, bag: Path, namespace: str) -> Iterator[RecorderProcess]:
-    """Record a bag, once it holds what the nodes send."""
-    with tempfile.TemporaryDirectory() as log, RecorderProcess(bag, namespace, Path(log) / 'record.log') as recording:
+    """Record a bag of what the explorer watches, once it holds what the nodes send."""
+    [topics] = operator.parameters('explorer', ('signal_topics',))
+    with (
+        tempfile.TemporaryDirectory() as log,
+        RecorderProcess(bag, namespace, Path(log) / 'record.log', topics) as recording,
+    ):
         operator.wait_until(
             lambda: records(bag, recording.check),
             RECORDER_S,

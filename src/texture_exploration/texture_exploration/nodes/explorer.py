@@ -65,7 +65,7 @@ from texture_exploration.exploration import (
     no_signal_watch,
     refusal,
 )
-from texture_exploration.explorer import Explorer
+from texture_exploration.explorer import CONNECTING, NO_CONTROL, Explorer
 from texture_exploration.guards import Listening, SignalWatch, SignalWatchParams
 from texture_exploration.motions import DEFAULTS, MOTIONS
 from texture_exploration.safety import SafetyLimits, SurfacePatch
@@ -119,6 +119,8 @@ class ExplorerNode(PatientLifecycleNode):
 
     Configuring checks that the arm answers, activating takes control, deactivating lifts the finger and releases it.
     """
+
+    owns_file = True  # limits in a misnamed section would be ignored
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('explorer', **kwargs)
@@ -440,7 +442,7 @@ class ExplorerNode(PatientLifecycleNode):
 
     def _why_not_ready(self) -> str:
         if not self._active:
-            return 'the explorer is not active: it has no control of the arm'
+            return f"{CONNECTING} '{self.get_parameter('arm').value}'" if self._autostart else NO_CONTROL
         return 'an exploration is running' if self._explorer.current else self._explorer.fault()
 
     def _broadcast_surface(self) -> None:
@@ -479,7 +481,7 @@ class ExplorerNode(PatientLifecycleNode):
             **self._explorer.counts,
         }
         if not self._active:
-            return 'WARN', 'the explorer is not active: it has no control of the arm', numbers
+            return 'WARN', self._why_not_ready(), numbers
         if fault:
             return 'ERROR', fault, numbers
         warning = self._explorer.arm.warning() or ('' if current else self._not_lifted)

@@ -16,11 +16,18 @@ from texture_recordings.nodes.replay import ReplayNode, ReplayParams
 def _configure_record(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('out', help='folder of the new bag; nothing may exist there')
     parser.add_argument('--all', action='store_true', help='every topic in the namespace, not only those of the suite')
+    parser.add_argument(
+        '--signal-topics',
+        default='',
+        metavar='TOPICS',
+        help='those of the fingers, in quotes: other namespaces below are left out',
+    )
     add_namespace(parser)
 
 
 def _record(options: argparse.Namespace) -> int:
-    run_node(RecordNode, {'out': options.out, 'all': options.all}, options.namespace)
+    parameters = {'out': options.out, 'all': options.all, 'signal_topics': options.signal_topics}
+    run_node(RecordNode, parameters, options.namespace)
     return 0
 
 

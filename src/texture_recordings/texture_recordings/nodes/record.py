@@ -37,6 +37,11 @@ class RecordParams:
     all: bool = param(
         False, 'Records every topic in the namespace and below it, not only those of the suite and a few of ROS.'
     )
+    signal_topics: str = param(
+        '',
+        "Topics of the fingers, as the explorer's parameter of this name; of other namespaces below nothing is "
+        "recorded, such as those of another explorer. '' records them all.",
+    )
 
 
 class RecordNode(Node):
@@ -60,6 +65,7 @@ class RecordNode(Node):
         self._writer = threading.Thread(target=self._write, name='writer')
         self._writer.start()
         self._namespace = self.get_namespace().rstrip('/')
+        self._fingers = {self.resolve_topic_name(topic).rpartition('/')[0] for topic in params.signal_topics.split()}
         self._seen: set[str] = set()  # topics that are recorded, or whose omission was logged
         for topic in TOPICS.values():
             self._subscribe(self.resolve_topic_name(topic.name), topic.msgtype, topic.qos)
@@ -85,6 +91,7 @@ class RecordNode(Node):
         """Subscribe to what has appeared."""
         for name, types in self.get_topic_names_and_types():
             ours = name.startswith(f'{self._namespace}/') and (self._all or types[0] in MESSAGES)
+            ours &= not self._fingers or name.rpartition('/')[0] in (self._namespace, *self._fingers)
             if name not in self._seen and (ours or name in COMMON):
                 if types[0] not in typestore().types:
                     self._seen.add(name)
