@@ -113,16 +113,6 @@ def test_a_device_never_waits_for_a_host_that_does_not_read(tmp_path: Path) -> N
     device.unplug()
 
 
-def test_the_channels_keep_their_order(open_rig: Make) -> None:
-    def feed(device: Any, first: int, ticks: int) -> None:
-        counts = counting(first, ticks, 30_000, 8, 1) * np.array([1, 0, 0, 0, 0, 0, 0, -1])[:, None]
-        device.measure({'signal': counts})
-
-    last = open_rig('daq', feed=feed).signal_s(0.5)[-1]
-    assert last.samples[0, 0] > 0
-    np.testing.assert_array_equal(last.samples[:, 7], -last.samples[:, 0])
-
-
 def swing(device: Any, first: int, ticks: int) -> None:
     """Feed a film that swings at 50 Hz, and a force that rises."""
     numbers = np.arange(first, first + ticks)[:, None, None]
