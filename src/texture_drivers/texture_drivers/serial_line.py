@@ -24,7 +24,7 @@ from texture_core.framing import TIME_BITS, CounterUnwrapper, Frame, FrameDecode
 from texture_core.types import NANOSECONDS, Array, TactileSignal
 from texture_drivers.health import Limits
 from texture_drivers.sensor import SensorParams
-from texture_drivers.timing import PPM, SLOW_CLOCK, StreamClock
+from texture_drivers.timing import PPM, RATE_TOLERANCE, SLOW_CLOCK, StreamClock
 
 # --------------------
 # A stream of a framed protocol, as a sensor declares it.
@@ -287,7 +287,6 @@ class StreamBlock(NamedTuple):
 
 RATE_CHECK_S = 1.0
 MAX_FAILED_CHECKS = 3  # consecutive failures that are no transient
-RATE_TOLERANCE = 0.02  # far more than clocks differ, far less than a wrong setting
 
 
 class StreamTracker:

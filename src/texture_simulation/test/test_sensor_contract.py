@@ -245,8 +245,7 @@ def test_after_a_brown_out_of_the_device_the_index_goes_on_with_the_time(make: M
     assert (last.first_sample - first.first_sample) / rig.case.rate_hz == pytest.approx(elapsed_s, abs=0.05)
 
 
-# One clock serves all; only without numbers and times in the packets does it follow by arrival alone.
-@pytest.mark.parametrize('name', [name for name in LINES if not LINES[name].numbered])
+@pytest.mark.parametrize('name', LINES)
 def test_a_clock_that_drifts_is_followed_and_reported(make: Make, name: str) -> None:
     rig = make(name, pace=1.004)
     rig.sensor.open()
