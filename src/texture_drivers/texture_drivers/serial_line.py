@@ -552,8 +552,8 @@ class FramedSensor(SerialSensor):
             ', '.join(f'0x{kind:02X}' for kind in sorted(kinds)) for kinds in (self._other_kinds, self.trackers)
         )
         return (
-            f"device '{self._params.device}' is open and sends frames of kind {came}, and {wanted} is needed; check "
-            'that it is the right device, and the kind in its firmware'
+            f"device '{self._params.device}' is open and sends frames of kind {came} instead of {wanted}; check that "
+            'it is the right device, and the kind in its firmware'
         )
 
     def _rows_of(self, stream: FramedStream, frame: Frame) -> int:

@@ -99,9 +99,9 @@ DECIMAL = {topic: stream._replace(kind=stream.kind - 6) for topic, stream in Emu
             'daq',
             'sends nothing',
             {'STREAMS': KIND_2},
-            'sends frames of kind 0x02, and 0x01 is needed; check .*right device',
+            'sends frames of kind 0x02 instead of 0x01; check .*right device',
         ),
-        ('pvdf', 'sends nothing', {'STREAMS': DECIMAL}, 'kind 0x0A, 0x0B, and 0x10, 0x11 is needed'),
+        ('pvdf', 'sends nothing', {'STREAMS': DECIMAL}, 'kind 0x0A, 0x0B instead of 0x10, 0x11'),
         ('tsf85', 'sends nothing, started', {'wrong_firmware': True}, 'no known packet'),
     ],
 )
