@@ -298,21 +298,21 @@ class SignalAdaptor:
         if measured is None:
             return
         rate_hz, certain = measured
-        topic = self.mapping.topic
-        if not certain and not self.rate_hz:
-            self.fault = (
-                f"the messages on '{topic}' come unevenly, about {rate_hz:.4g} samples a second: their rate cannot be "
-                'measured; set rate_hz in the mapping'
-            )
-        elif certain and not self.rate_hz:
-            self.rate_hz, self.fault = rounded_rate(rate_hz), ''
+        if certain and not self.rate_hz:
+            self.rate_hz = rounded_rate(rate_hz)
             self._start()
-        elif certain:
-            off = abs(rate_hz / self.rate_hz - 1) > RATE_TOLERANCE
+        if not self.rate_hz:
             self.fault = (
-                f"the messages on '{topic}' bring {rate_hz:.4g} samples a second, and {self.rate_hz:.4g} are expected; "
-                'correct rate_hz in the mapping, or start the node again to measure it'
-            ) if off else ''  # fmt: skip
+                f"the messages on '{self.mapping.topic}' come unevenly, about {rate_hz:.4g} samples a second: their "
+                'rate cannot be measured; set rate_hz in the mapping'
+            )
+        elif certain and abs(rate_hz / self.rate_hz - 1) > RATE_TOLERANCE:
+            self.fault = (
+                f"the messages on '{self.mapping.topic}' bring {rate_hz:.4g} samples a second, and {self.rate_hz:.4g} "
+                'are expected; correct rate_hz in the mapping, or start the node again to measure it'
+            )
+        elif certain:
+            self.fault = ''
 
     def _read(self, message: Any, sent_ns: int) -> Sample:
         rows = self._rows(message)

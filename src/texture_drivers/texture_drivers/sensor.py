@@ -100,7 +100,7 @@ class SensorReader:
             self._of_sensor(self.sensor.open)
             self._quiet_attempts = 0
             if self.fault == NOT_OPENED:
-                self.fault = 'it is open, and no sample has come yet'
+                self.fault = 'no sample has come since it was opened; check the sensor'
             while not self._stop.is_set():
                 for topic, batches in self._of_sensor(self.sensor.read).items():
                     self._deliver_all(topic, batches)
