@@ -36,7 +36,9 @@ demo: setup
 lint: setup
 	@$(RUN) ruff check .
 	@$(RUN) ruff format --check . || { echo 'to format all files: $(RUN) ruff format .'; exit 1; }
+	@echo 'lint: types'
 	@$(RUN) mypy
+	@echo 'lint: figures of the pages, a minute or more'
 	@$(RUN) python tools/figures.py --check
 	@$(RUN) python tools/words.py > /dev/null || $(RUN) python tools/words.py
 

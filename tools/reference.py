@@ -538,22 +538,23 @@ def page(name: str, root: Path = ROOT) -> str:
     return f'{GENERATED}\n\n# {title}\n\n{about}\n\n{make(root).strip()}\n'
 
 
-def made(root: Path = ROOT) -> dict[Path, str]:
-    """Return every generated page of the repository and its text."""
-    pages = {FOLDER / f'{name}.md': page(name, root) for name in PAGES}
-    return pages | {path.parent / 'README.md': package_readme(path.parent) for path in root.glob('src/*/package.xml')}
+def made(root: Path = ROOT) -> Iterator[tuple[Path, str]]:
+    """Yield every generated page of the repository and its text."""
+    yield from ((FOLDER / f'{name}.md', page(name, root)) for name in PAGES)
+    yield from ((path.parent / 'README.md', package_readme(path.parent)) for path in root.glob('src/*/package.xml'))
 
 
 def stale() -> list[str]:
     """Return one sentence for each page that is not what the source makes now."""
     return [
         f'{path.relative_to(ROOT)} is not up to date; run .venv/bin/ros-run python tools/reference.py'
-        for path, text in made().items()
+        for path, text in made()
         if not path.exists() or path.read_text(encoding='utf-8') != text
     ]
 
 
 if __name__ == '__main__':
     FOLDER.mkdir(exist_ok=True)
-    for path, text in made().items():
+    for path, text in made():
+        print(f'reference: {path.relative_to(ROOT)}', flush=True)
         path.write_text(text, encoding='utf-8')

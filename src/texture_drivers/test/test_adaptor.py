@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace as Message
 from typing import Any
@@ -16,7 +17,7 @@ import pytest
 from texture_core.config import shipped
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.types import NANOSECONDS, TactileSignal
-from texture_drivers.adaptor import SignalAdaptor, SignalMapping, compile_path, load_mapping
+from texture_drivers.adaptor import PeriodMeter, SignalAdaptor, SignalMapping, compile_path, load_mapping
 
 START_NS = 1_700_000_000 * NANOSECONDS
 MS = 1_000_000
@@ -232,6 +233,83 @@ def test_jitter_of_stamps_makes_no_losses_and_hardly_moves_the_times() -> None:
     assert jumps(batches) == adaptor.lost == 0
     stamps = np.array([batch.stamp_ns for batch in batches][100:])
     assert np.ptp(stamps - 10 * MS * np.arange(len(stamps))) < MS
+
+
+def measured(times_ms: Any) -> tuple[float, bool]:
+    """Return the rate of messages at these times, Hz, and whether it is certain."""
+    meter = PeriodMeter()
+    return next(filter(None, (meter.add(1, START_NS + round(ms * MS)) for ms in times_ms)))
+
+
+def noise(seed: int, count: int = 400) -> Any:
+    return np.random.default_rng(seed).random(count)
+
+
+# Of messages each 10 ms; those that are kept back for 60 ms come at once.
+EVEN = np.arange(400) * 10.0
+IN_TIME = np.arange(400) % 40 < 6
+
+
+@pytest.mark.parametrize('seed', range(8))
+@pytest.mark.parametrize(
+    ('times_ms', 'off'),
+    [
+        (lambda seed: EVEN, 0.0),
+        (lambda seed: EVEN[noise(seed) > 0.3], 0.0),
+        (lambda seed: EVEN + 2.0 * noise(seed), 2e-3),
+        (lambda seed: np.sort(EVEN + np.minimum(20.0, -0.8 * np.log(noise(seed)))), 2e-3),
+        (lambda seed: (EVEN + 1.5 * noise(seed))[noise(seed + 9) > 0.2], 2e-3),
+        (lambda seed: np.where(IN_TIME, EVEN // 400 * 400 + 60, EVEN), 0.0),
+    ],
+    ids=['even', 'three in ten lost', 'jitter', 'sometimes late', 'jitter and losses', 'stalls'],
+)
+def test_the_rate_is_that_of_the_sampling_whatever_is_lost_or_late(times_ms: Any, off: float, seed: int) -> None:
+    rate_hz, certain = measured(times_ms(seed))
+    assert certain
+    assert rate_hz == pytest.approx(100.0, rel=off + 1e-9)
+
+
+@pytest.mark.parametrize(
+    'times_ms',
+    [
+        EVEN // 20 * 20 + 0.1 * (EVEN % 20),
+        EVEN // 40 * 40 + 0.01 * (EVEN % 40),
+        np.zeros(19).tolist() + [3000.0] * 20,
+        np.cumsum(-10 * np.log(noise(1))),
+        EVEN[noise(1) > 0.6],
+        np.sort(EVEN + 15 * noise(2)),
+    ],
+    ids=['pairs', 'bursts of four', 'equal stamps', 'random', 'six in ten lost', 'jitter above a period'],
+)
+def test_a_rate_is_not_certain_if_messages_come_unevenly(times_ms: Any) -> None:
+    assert not measured(times_ms)[1]
+
+
+def wrenches(rate_hz: float = 0.0) -> SignalAdaptor:
+    return SignalAdaptor('signal', replace(load_mapping('wrench').signals['signal'], rate_hz=rate_hz))
+
+
+def test_messages_lost_while_the_rate_is_measured_do_not_change_it_and_another_rate_is_a_fault() -> None:
+    adaptor, make = wrenches(), CASES['wrench', 'signal'][0]
+    fed(adaptor, make, [n for n in range(300) if n % 10 not in (2, 5, 6)], 10 * MS)
+    assert (adaptor.rate_hz, adaptor.fault) == (100.0, '')
+    fed(adaptor, make, range(150, 350), 20 * MS)
+    assert 'bring 50 samples a second, and 100 are expected; correct rate_hz' in adaptor.fault
+    fed(adaptor, make, range(700, 1100), 10 * MS)
+    assert adaptor.fault == ''
+
+
+def test_a_rate_that_is_set_and_wrong_is_a_fault_and_one_that_cannot_be_measured_too() -> None:
+    make = CASES['wrench', 'signal'][0]
+    adaptor = wrenches(rate_hz=97.0)
+    fed(adaptor, make, range(300), 10 * MS)
+    assert 'bring 100 samples a second, and 97 are expected' in adaptor.fault
+    adaptor = wrenches()
+    pairs = [make(0, START_NS + n // 2 * 20 * MS + n % 2 * 1000) for n in range(300)]
+    for message in pairs:
+        adaptor.take(message, START_NS)
+    assert 'come unevenly, about' in adaptor.fault
+    assert adaptor.batches() == []
 
 
 def test_a_gap_in_the_stamps_is_a_loss() -> None:

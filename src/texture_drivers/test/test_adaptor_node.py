@@ -9,13 +9,15 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import WrenchStamped
 from std_msgs.msg import Float32MultiArray
 from texture_msgs import msg
 
 from texture_core.errors import InvalidParameter
-from texture_core.ros import SENSOR_QOS
+from texture_core.ros import SENSOR_QOS, to_stamp
 from texture_core.ros_testing import LocalGraph
+from texture_core.types import NANOSECONDS
 from texture_drivers.nodes.adaptor import Adaptor
 
 pytestmark = [pytest.mark.ros, pytest.mark.realtime]
@@ -59,6 +61,27 @@ def test_messages_become_signals_and_silence_and_malformed_values_are_reported(
     values = {value.key: value.value for value in reports[-1].status[0].values}
     assert values['refused messages'] == '1'
     assert 'unknown' in values['losses']
+
+
+def test_the_measured_rate_is_logged_and_a_change_of_it_is_an_error(graph: LocalGraph, capfd) -> None:
+    graph.add(Adaptor, mapping='wrench')
+    reports = graph.listen(DiagnosticArray, '/diagnostics')
+    sender = graph.peer.create_publisher(WrenchStamped, 'wrench', SENSOR_QOS)
+    now_ns, log = 1_700_000_000 * NANOSECONDS, []
+
+    def logs(text: str, period_ns: int) -> bool:
+        nonlocal now_ns
+        now_ns += period_ns
+        message = WrenchStamped()
+        message.header.stamp = to_stamp(now_ns)
+        sender.publish(message)
+        log.append(capfd.readouterr().err)
+        return text in ''.join(log)
+
+    graph.until(lambda: logs("the rate of 'signal' was measured: 100 Hz; set rate_hz", 10_000_000))
+    graph.until(lambda: logs('bring 50 samples a second, and 100 are expected', 20_000_000))
+    status = reports[-1].status[0]
+    assert (status.level, status.message[-30:]) == (DiagnosticStatus.ERROR, 'start the node again to measure it'[-30:])
 
 
 def test_a_package_that_is_missing_is_reported_in_one_sentence(graph: LocalGraph) -> None:

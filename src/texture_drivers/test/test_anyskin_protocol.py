@@ -11,7 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from texture_drivers.anyskin import FrameParser
+from texture_core.types import TactileSignal
+from texture_drivers.anyskin import AnySkin, FrameParser
+from texture_drivers.sensor import SensorParams
 
 SIZE = 82
 
@@ -40,6 +42,19 @@ def test_a_frame_of_the_manual_s_layout_gives_its_values() -> None:
     assert runs[0].values.shape == (3, 5, 4)
     np.testing.assert_allclose(runs[0].values[0, 0], [30.0, 100.0, -200.0, 300.0])
     np.testing.assert_allclose(runs[0].values[0, 4], [30.0, 5.0, 6.0, 7.0])
+
+
+def test_each_axis_of_each_magnetometer_is_in_its_channel() -> None:
+    """Of the vendor's four values, temperature, x, y and z, the temperature is no channel."""
+    skin = AnySkin(SensorParams(config='{rate_hz: 100.0}'))
+    signals: list[TactileSignal] = []
+    for number in range(50):
+        signals += skin.feed(stream(range(number, number + 1)), number * 10_000_000).get('signal', [])
+    values = dict(zip(signals[-1].channels, signals[-1].samples[-1], strict=True))
+    assert values == {
+        'm0_x': 149.0, 'm0_y': -200.0, 'm0_z': 300.0,
+        **{f'm{number}_{axis}': value for number in range(1, 5) for axis, value in (('x', 5), ('y', 6), ('z', 7))},
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize(('first', 'begin'), [(0, 1), (1, 1), (40, 1), (80, 1), (81, 2)])

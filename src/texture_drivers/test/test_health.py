@@ -77,6 +77,17 @@ def test_a_sensor_that_is_gone_is_opened_again_and_reported_of_once() -> None:
     assert reader.fault == ''
 
 
+def test_a_sensor_that_opens_and_delivers_nothing_is_not_called_unopened(monkeypatch) -> None:
+    read = threading.Event()
+    monkeypatch.setattr(Scripted, 'read', lambda sensor: read.set() or {})
+    reader = SensorReader(Scripted(''), lambda *_: None)
+    assert reader.fault == 'not opened yet'
+    reader.start()
+    assert read.wait(DEADLINE_S)
+    assert reader.fault == 'no sample has come since it was opened; check the sensor'
+    reader.stop()
+
+
 def test_a_sensor_that_raises_anything_else_is_reported_with_its_line_and_opened_again() -> None:
     sensor, reader, logged = run('..v..', 4)
     assert sensor.counts['reopened'] == 1

@@ -126,9 +126,22 @@ def test_the_jitter_of_the_devices_stamps_and_its_rounding_move_nothing():
 @pytest.mark.parametrize('true_hz', [2000.0, 3000.0])
 def test_a_wrong_rate_is_named_after_three_seconds(true_hz):
     tracker = StreamTracker(stream())
-    with pytest.raises(DeviceError, match=f'{true_hz:.4g} samples in a second .* 2500 are set'):
+    with pytest.raises(DeviceError, match=f'{true_hz:.4g} samples in a second .* 2500 are needed'):
         for i in range(2000):
             tracker.place(round(i * 10 / true_hz * 1e6), 10, 0)
+
+
+def test_a_stream_of_a_wrong_rate_is_not_published_again_before_its_rate_is_right():
+    line = line_of(stream())
+    with pytest.raises(DeviceError, match=r'delivers 2425 samples .* correct the timer'):
+        run(line, range(1000), rate_hz=2425.0)
+    line.restart()
+    with pytest.raises(DeviceError, match='delivers 2425 samples'):
+        assert run(line, range(240), offset_ns=START + 9 * SECOND, rate_hz=2425.0) == {}
+        run(line, range(240, 320), offset_ns=START + 9 * SECOND, rate_hz=2425.0)
+    line.restart()
+    batches = run(line, range(500), offset_ns=START + 19 * SECOND)['signal']
+    assert 200 < len(batches) < 300  # of 500 frames: after one check
 
 
 def test_one_hiccup_of_the_device_is_no_wrong_rate():

@@ -16,7 +16,7 @@ import numpy as np
 from texture_core.config import find_file, from_mapping, load_yaml, param
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.types import NANOSECONDS, Array, TactileSignal
-from texture_drivers.timing import ArrivalNumbering, RateMeter, SampleCounter, StreamClock
+from texture_drivers.timing import RATE_TOLERANCE, ArrivalNumbering, SampleCounter, StreamClock, rounded_rate
 
 # --------------------
 # The mapping file: which fields of which messages become which signal.
@@ -43,7 +43,8 @@ class SignalMapping:
     gain: float = param(1.0, 'Factor by which the numbers are multiplied; it is signed.')
     rate_hz: float = param(
         0.0,
-        'Samples of a channel in a second; 0 measures it in the first 2 s, to a whole hertz. Set it for training.',
+        'Samples of a channel in a second; 0 measures it in 2 s of even messages, to a whole hertz from 100 Hz on. Set '
+        'it for training.',
         unit='Hz',
         low=0.0,
         high=1e6,
@@ -156,6 +157,51 @@ def read_time_ns(stamp: Any) -> int:
 
 
 # --------------------
+# The rate of messages, by their times.
+
+MEASURED_S = 2.0
+LEAST_MESSAGES = 20
+MOST_OFF = 0.25  # of a period: what is farther off a whole number of periods does not fit
+LEAST_FITTING = 0.75  # of the messages: of those that come in bursts or at random fewer fit
+LEAST_RECEIVED = 0.5  # of the periods: beyond, a period cannot be told from several
+
+
+class PeriodMeter:
+    """Measure the rate of messages in stretches of 2 s, whatever is lost between them.
+
+    The period is the mean of the differences of the times that are near their median. A message fits if it comes a
+    whole number of periods after the last one that fitted. The rate is certain if all messages hold equally many
+    samples, three of four fit, and at least half of the periods have one.
+    """
+
+    def __init__(self) -> None:
+        self._messages: list[tuple[int, int]] = []  # of this stretch: samples and time, ns
+
+    def add(self, samples: int, at_ns: int) -> tuple[float, bool] | None:
+        """Add a message; at the end of a stretch return the rate, Hz, and whether it is certain."""
+        self._messages.append((samples, at_ns))
+        elapsed_ns = at_ns - self._messages[0][1]
+        if elapsed_ns < MEASURED_S * NANOSECONDS or len(self._messages) < LEAST_MESSAGES:
+            return None
+        messages, self._messages = self._messages, []
+        counts, times_ns = np.array(messages).T
+        average_hz = counts[1:].sum() * NANOSECONDS / elapsed_ns
+        steps_ns = np.diff(times_ns)
+        near = abs(steps_ns - np.median(steps_ns)) < MOST_OFF * np.median(steps_ns)
+        if not near.any() or counts.min() != counts.max():
+            return average_hz, False
+        period_ns = steps_ns[near].mean()
+        last_ns, periods, fitting = times_ns[0], 0, 0
+        for time_ns in times_ns[1:]:
+            steps = (time_ns - last_ns) / period_ns
+            if steps > MOST_OFF and abs(steps - round(steps)) < MOST_OFF:
+                last_ns, periods, fitting = time_ns, periods + round(steps), fitting + 1
+        if fitting < max(LEAST_FITTING * len(steps_ns), LEAST_RECEIVED * periods):
+            return average_hz, False
+        return counts[0] * periods * NANOSECONDS / (last_ns - times_ns[0]), True
+
+
+# --------------------
 # One signal: its messages become numbered, timed batches.
 
 LATE_S = 0.015  # stamps jitter by some ms; what is later than that, and than half a message, has gaps before it
@@ -180,13 +226,14 @@ class SignalAdaptor:
     def __init__(self, name: str, mapping: SignalMapping, frame_id: str = '') -> None:
         self.mapping = mapping
         self.samples = self.lost = self.refused = self.invalid = self.unnumbered = self.unpaired = 0
-        self.rate_hz = mapping.rate_hz
+        self.rate_hz = mapping.rate_hz  # 0 until it has been measured
+        self.fault = ''  # what is wrong with the rate
         self._sensor, self._frame_id = mapping.sensor or name, frame_id
         self._channels = tuple(mapping.channels)
         self._values = [compile_path(path) for path in mapping.values]
         self._stamp = compile_path(mapping.stamp) if mapping.stamp else None
         self._number = compile_path(mapping.number) if mapping.number else None
-        self._meter = RateMeter()
+        self._meter = PeriodMeter()
         self._samples: deque[Sample] = deque()  # that wait for their number
         self._numbers: deque[tuple[int, int]] = deque()  # and when they were sent
         self._ready: list[Sample] = []
@@ -201,10 +248,10 @@ class SignalAdaptor:
         except InvalidData:
             self.refused += 1
             raise
+        self._measure(len(sample.rows), sample.end_ns)
         if not self.rate_hz:
-            self.rate_hz = self._meter.update(len(sample.rows), sample.end_ns)
-            self._start()
-        elif self.mapping.number_topic:
+            return
+        if self.mapping.number_topic:
             self._samples.append(sample)
         elif self._number is not None:
             self._ready.append(sample)
@@ -244,6 +291,28 @@ class SignalAdaptor:
         self._clock = StreamClock(rate_hz) if self._stamp and not self._number else self._numbering.clock
         self._counter = SampleCounter(ticks=0)
         self._next_index, self._end_ns = 0, 0
+
+    def _measure(self, samples: int, at_ns: int) -> None:
+        """Measure the rate until it is known, then compare what is measured with it."""
+        measured = self._meter.add(samples, at_ns)
+        if measured is None:
+            return
+        rate_hz, certain = measured
+        if certain and not self.rate_hz:
+            self.rate_hz = rounded_rate(rate_hz)
+            self._start()
+        if not self.rate_hz:
+            self.fault = (
+                f"the messages on '{self.mapping.topic}' come unevenly, about {rate_hz:.4g} samples a second: their "
+                'rate cannot be measured; set rate_hz in the mapping'
+            )
+        elif certain and abs(rate_hz / self.rate_hz - 1) > RATE_TOLERANCE:
+            self.fault = (
+                f"the messages on '{self.mapping.topic}' bring {rate_hz:.4g} samples a second, and {self.rate_hz:.4g} "
+                'are expected; correct rate_hz in the mapping, or start the node again to measure it'
+            )
+        elif certain:
+            self.fault = ''
 
     def _read(self, message: Any, sent_ns: int) -> Sample:
         rows = self._rows(message)

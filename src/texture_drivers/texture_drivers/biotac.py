@@ -478,6 +478,8 @@ class BioTac(FramedSensor):
         return Cheetah(self._layout) if self._params.device == CHEETAH else super()._open_port()
 
     def _silence_sentence(self) -> str:
+        if self._other_kinds:
+            return super()._silence_sentence()
         if not self._unanswered:
             return (
                 f"device '{self._params.device}' is open but sends no complete frames; check that it is a BioTac "

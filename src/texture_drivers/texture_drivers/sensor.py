@@ -54,8 +54,9 @@ class SensorParams(BatchParams):
 # Read a sensor in a thread, reopen it when it is gone, and report its faults.
 
 RETRY_S = 0.2
-# So often a sensor that was never there is tried without a warning, for 5 s: its device may appear after the node.
-QUIET_ATTEMPTS = 25
+# So often a sensor that was never there is tried without a warning, for 10 s: its device may appear after the node.
+QUIET_ATTEMPTS = 50
+NOT_OPENED = 'not opened yet'
 Deliver = Callable[[str, TactileSignal], None]
 LogSentence = Callable[[str], None]
 T = TypeVar('T')
@@ -68,7 +69,7 @@ class SensorReader:
         self, sensor: Sensor, deliver: Deliver, warn: LogSentence = lambda _: None, inform: LogSentence = lambda _: None
     ) -> None:
         self.sensor = sensor
-        self.fault = 'not opened yet'  # '' while all is well
+        self.fault = NOT_OPENED  # '' while all is well
         self.published: dict[str, int] = dict.fromkeys(sensor.expected_rates_hz, 0)
         self._quiet_attempts = QUIET_ATTEMPTS
         self._warned = ''  # of this fault
@@ -98,6 +99,8 @@ class SensorReader:
         try:
             self._of_sensor(self.sensor.open)
             self._quiet_attempts = 0
+            if self.fault == NOT_OPENED:
+                self.fault = 'no sample has come since it was opened; check the sensor'
             while not self._stop.is_set():
                 for topic, batches in self._of_sensor(self.sensor.read).items():
                     self._deliver_all(topic, batches)

@@ -24,7 +24,7 @@ from texture_core.framing import TIME_BITS, CounterUnwrapper, Frame, FrameDecode
 from texture_core.types import NANOSECONDS, Array, TactileSignal
 from texture_drivers.health import Limits
 from texture_drivers.sensor import SensorParams
-from texture_drivers.timing import PPM, SLOW_CLOCK, StreamClock
+from texture_drivers.timing import PPM, RATE_TOLERANCE, SLOW_CLOCK, StreamClock
 
 # --------------------
 # A stream of a framed protocol, as a sensor declares it.
@@ -287,7 +287,6 @@ class StreamBlock(NamedTuple):
 
 RATE_CHECK_S = 1.0
 MAX_FAILED_CHECKS = 3  # consecutive failures that are no transient
-RATE_TOLERANCE = 0.02  # far more than clocks differ, far less than a wrong setting
 
 
 class StreamTracker:
@@ -302,6 +301,7 @@ class StreamTracker:
         self.samples = 0  # published
         self.lost = 0  # between the first one published and the last
         self.overrun = 0  # samples that the device itself left out
+        self.wrong_rate = False  # until a check is passed nothing is published, also after an interruption
         self._next_index = 0
         self._next_us: float | None = None  # when the next sample is due by the device's clock
         self._due_ns: int | None = None  # when the next sample would have come, had there been no interruption
@@ -343,9 +343,10 @@ class StreamTracker:
         for block in blocks:
             expected = self._next_index
             index = self.place(block.time_us, block.rows, block.lost_frames)
-            self.lost += 0 if self._published is None else index - self._published
-            self._published = index + block.rows
-            self.samples += block.rows
+            if not self.wrong_rate:
+                self.lost += 0 if self._published is None else index - self._published
+                self._published = index + block.rows
+                self.samples += block.rows
             if not runs or index != expected:
                 runs.append((index, block.time_us, []))
             runs[-1][2].append(block.data)
@@ -366,11 +367,12 @@ class StreamTracker:
             rate_hz = self._rows / elapsed_s
             off = abs(rate_hz / self.stream.rate_hz - 1) > RATE_TOLERANCE
             self._failed_checks = self._failed_checks + 1 if off else 0
-            if self._failed_checks == MAX_FAILED_CHECKS:
+            self.wrong_rate = off and (self.wrong_rate or self._failed_checks == MAX_FAILED_CHECKS)
+            if self.wrong_rate:
                 raise DeviceError(
                     f"'{self.stream.sensor}' delivers {rate_hz:.4g} samples in a second of the device's clock, and "
-                    f'{self.stream.rate_hz:.4g} are set; correct the rate in the settings, or lighten the load of the '
-                    'device'
+                    f'{self.stream.rate_hz:.4g} are needed; correct the timer of the device, or for a DAQ '
+                    'finger the rate in the settings, or lighten the load of the device'
                 )
             self._since_us, self._rows = time_us, 0
         self._rows += rows
@@ -403,6 +405,8 @@ class FramedSensor(SerialSensor):
         super().__init__(params, now_ns, baud=baud)
         self.malformed = 0  # frames that passed the checksum and hold another number of bytes than declared
         self.other_frames = 0  # frames of other kinds
+        self._known_frames = 0
+        self._other_kinds: set[int] = set()  # since the last known frame
         self.restarts = 0  # of the device's clock
         self.deframer = FrameDecoder()
         self.clock = StreamClock(MICROSECONDS, max_drift=max_drift)
@@ -413,8 +417,8 @@ class FramedSensor(SerialSensor):
 
     @property
     def valid_frames(self) -> int:
-        """Frames that passed the checksum, of any kind."""
-        return self.deframer.frames
+        """Frames of the known kinds that hold samples."""
+        return self._known_frames
 
     @property
     def counts(self) -> Mapping[str, int]:
@@ -450,6 +454,7 @@ class FramedSensor(SerialSensor):
     def restart(self) -> None:
         """Resume after an interruption, with the index according to the host's clock."""
         self.deframer.restart()
+        self._other_kinds = set()
         self._restart_streams()
 
     def feed(self, data: bytes, arrival_ns: int) -> Mapping[str, Sequence[TactileSignal]]:
@@ -465,9 +470,11 @@ class FramedSensor(SerialSensor):
             return {}
         topics: dict[str, list[TactileSignal]] = {}
         for kind, found in blocks.items():
-            for run in self.trackers[kind].runs(found, self.clock):
-                for topic, batch in self._batches(self.trackers[kind].stream, *run):
-                    topics.setdefault(topic, []).append(batch)
+            tracker = self.trackers[kind]
+            for run in tracker.runs(found, self.clock):
+                for topic, batch in self._batches(tracker.stream, *run):
+                    if not tracker.wrong_rate:
+                        topics.setdefault(topic, []).append(batch)
         return topics
 
     def _batches(
@@ -524,6 +531,7 @@ class FramedSensor(SerialSensor):
         tracker = self.trackers.get(frame.kind)
         if tracker is None:
             self.other_frames += 1
+            self._other_kinds.add(frame.kind)
             return 0
         if frame.version != VERSION:
             raise DeviceError(
@@ -532,7 +540,21 @@ class FramedSensor(SerialSensor):
             )
         rows = self._rows_of(tracker.stream, frame)
         self.malformed += not rows
+        if rows:
+            self._known_frames += 1
+            self._other_kinds = set()
         return rows
+
+    def _silence_sentence(self) -> str:
+        if not self._other_kinds:
+            return super()._silence_sentence()
+        came, wanted = (
+            ', '.join(f'0x{kind:02X}' for kind in sorted(kinds)) for kinds in (self._other_kinds, self.trackers)
+        )
+        return (
+            f"device '{self._params.device}' is open and sends frames of kind {came} instead of {wanted}; check that "
+            'it is the right device, and the kind in its firmware'
+        )
 
     def _rows_of(self, stream: FramedStream, frame: Frame) -> int:
         """Return how many samples a frame of a stream holds; 0 if it contradicts itself."""

@@ -442,11 +442,19 @@ LEAST_ARRIVALS = 20
 WHOLE_FROM_HZ = 100.0
 
 
+RATE_TOLERANCE = 0.02  # far more than clocks differ, far less than a wrong setting
+
+
+def rounded_rate(rate_hz: float) -> float:
+    """Return a measured rate as it is used."""
+    return float(round(rate_hz)) if rate_hz >= WHOLE_FROM_HZ else float(f'{rate_hz:.3g}')
+
+
 class RateMeter:
     """Count samples until their rate is known.
 
     A sample arrives late by a varying delay but never early, so the period is the slope of the line just below all
-    arrivals (see `clock.StreamClock`).
+    arrivals (see `StreamClock`).
     """
 
     def __init__(self) -> None:
@@ -466,8 +474,7 @@ class RateMeter:
         elapsed_ns = self._arrivals[-1].delay_ns
         if elapsed_ns < MEASURED_S * NANOSECONDS or len(self._arrivals) < LEAST_ARRIVALS:
             return 0.0
-        rate_hz = NANOSECONDS / supporting_slope(self._arrivals)
-        return float(round(rate_hz)) if rate_hz >= WHOLE_FROM_HZ else float(f'{rate_hz:.3g}')
+        return rounded_rate(NANOSECONDS / supporting_slope(self._arrivals))
 
 
 # --------------------

@@ -17,7 +17,7 @@ from texture_exploration import explorer as explorer_module
 from texture_exploration.arms.arm import ArmCommand
 from texture_exploration.arms.tool_state import FollowWatch
 from texture_exploration.arms.tool_state import RosControllersParams as Params
-from texture_exploration.motions import MOTIONS
+from texture_exploration.motions import DEFAULTS, MOTIONS
 from texture_exploration.touch import TouchParams
 from texture_simulation.devices.twist_controller import TwistControllerParams
 
@@ -373,11 +373,9 @@ def test_the_force_is_kept_from_a_thirtieth_of_the_declared_stiffness_on(stiffne
 @pytest.mark.parametrize('motion', MOTIONS)
 def test_every_motion_succeeds_behind_a_late_controller(motion):
     robot = Robot(TwistControllerParams(start_height_m=0.003)).connect()
-    requests = {
-        'circular': {'speed_m_s': 0.05, 'turns': 0.5},
-        'in_hand_sliding': {'duration_s': 1.0},
-    }
-    outcome = robot.explore(ExplorationRequest(motion, **requests.get(motion, {'distance_m': 0.02})))
+    short = {'distance_m': 0.02, 'turns': 0.5, 'duration_s': 1.0}
+    request = {'speed_m_s': 0.05} | {number: value for number, value in short.items() if number in DEFAULTS[motion]}
+    outcome = robot.explore(ExplorationRequest(motion, **request))
     assert outcome.success, outcome.message
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""A sensor on its emulated device, whose samples encode their index, so that every fault is detected."""
+"""A sensor on its emulated device, whose samples encode index, channel and finger, so that every fault is detected."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ MakeDevice = Callable[[Path, np.random.Generator], EmulatedDevice]
 class RigCase:
     """A device, how it is fed, and how what arrives is to be read.
 
-    Sample i of `topic` holds i and a constant, modulo `modulus`.
+    Channel c of sample i of `topic` holds i, c and a constant, modulo `modulus`; see `counting`.
     """
 
     device: MakeDevice
@@ -50,6 +50,12 @@ class RigCase:
     units: Mapping[str, str | tuple[str, ...]]
     modulus: int
     config: str = ''  # Settings of the sensor, so that it publishes counts
+    resting: str = ''  # Topic that the device is not fed with, if there is one
+
+    @property
+    def finger(self) -> int:
+        """Finger that `topic` is of: 1 for 'finger1/signal', 0 without a prefix."""
+        return int(self.topic.removeprefix('finger').split('/')[0]) if '/' in self.topic else 0
 
     @property
     def rate_hz(self) -> float:
@@ -57,17 +63,17 @@ class RigCase:
         return self.ticks_per_s * self.samples_per_tick
 
 
-def counting(first: int, samples: int, modulus: int, *shape: int) -> AnyArray:
-    """Return consecutive samples that hold their number in all of (n_channels, n_fingers)."""
-    numbers = np.arange(first, first + samples) % modulus
-    return np.broadcast_to(numbers[:, None, None], (samples, *shape))
+def counting(first: int, samples: int, modulus: int, channels: int, fingers: int) -> AnyArray:
+    """Return samples, (samples, channels, fingers): a channel holds 1 more than the one before, a finger a quarter."""
+    numbers = np.arange(first, first + samples)[:, None, None] + np.arange(channels)[:, None]
+    return (numbers + np.arange(fingers) * modulus // 4) % modulus
 
 
 def feed_tsf85(taxels: int, fingers: int) -> Feed:
-    """Return what feeds a TSF-85 with images of so many taxels; all fingers feel the same."""
+    """Return what feeds a TSF-85 with images of so many taxels."""
 
     def feed(device: Any, first: int, ticks: int) -> None:
-        image = np.full((1, taxels, fingers), first % 1000)
+        image = counting(first, 1, 1000, taxels, fingers)
         device.measure({'signal': counting(first, ticks, 1000, 1, fingers), 'signal_static': image})
 
     return feed
@@ -83,8 +89,8 @@ def feed_biotac(slots: int, fingers: int) -> Feed:
     return feed
 
 
-def feed_alike(channels: int) -> Feed:
-    """Return what feeds this many channels alike."""
+def feed_signal(channels: int) -> Feed:
+    """Return what feeds a device that has one stream of this many channels."""
     return lambda device, first, ticks: device.measure({'signal': counting(first, ticks, 30_000, channels, 1)})
 
 
@@ -102,7 +108,10 @@ def tsf85(prefix: str = '', taxels: int = 28, fingers: int = 1) -> RigCase:
         f'{prefix}signal_static': 'count',
         f'{prefix}signal_imu': imu,
     }
-    return RigCase(EmulatedTsf85, f'{prefix}signal', 1000.0, 1, feed_tsf85(taxels, fingers), units, 1000)
+    feed = feed_tsf85(taxels, fingers)
+    return RigCase(
+        EmulatedTsf85, f'{prefix}signal', 1000.0, 1, feed, units, 1000, resting=f'{prefix}signal_imu'
+    )  # fmt: skip
 
 
 def biotac(device: MakeDevice = EmulatedBioTac, prefix: str = '', slots: int = 44, fingers: int = 1) -> RigCase:
@@ -118,13 +127,13 @@ CASES: Mapping[str, RigCase] = {
     'biotac': biotac(),
     'biotac_sp': biotac(slots=54),
     'biotac_hand': biotac(partial(EmulatedBioTac, serials=('BT-0', 'BT-1', 'BT-2')), 'finger2/', fingers=3),
-    'daq': RigCase(EmulatedDaq, 'signal', 2500.0, 1, feed_alike(8), {'signal': 'count'}, 30_000, config=DAQ),
+    'daq': RigCase(EmulatedDaq, 'signal', 2500.0, 1, feed_signal(8), {'signal': 'count'}, 30_000, config=DAQ),
     'pvdf': RigCase(
         EmulatedPvdf, 'signal', 4096.0, 1, feed_pvdf, {'signal': 'pC', 'signal_static': 'N'}, 30_000,
         config='{film_gain_pc: 1.0, force_gain_n: 1.0}',
     ),
     'anyskin': RigCase(
-        EmulatedAnySkin, 'signal', 250.0, 1, feed_alike(15), {'signal': 'µT'}, 30_000, config='{rate_hz: 250.0}'
+        EmulatedAnySkin, 'signal', 250.0, 1, feed_signal(15), {'signal': 'µT'}, 30_000, config='{rate_hz: 250.0}'
     ),
 }  # fmt: skip
 
@@ -223,15 +232,22 @@ class Rig:
         raise TimeoutError(f'{self._name}: no error came')
 
     def offsets(self, batches: Sequence[TactileSignal]) -> AnyArray:
-        """Return the difference of each finite sample and the value of its index: constant if each is in its place."""
-        values = np.concatenate([batch.samples[:, 0] for batch in batches])
+        """Return each finite value without its index and channel, (n,): constant if each is in its place."""
+        values = np.concatenate([batch.samples for batch in batches])
         indices = np.concatenate([np.arange(batch.first_sample, batch.next_sample) for batch in batches])
-        offsets: AnyArray = (values - indices) % self.case.modulus
+        channels = np.arange(values.shape[1])
+        offsets: AnyArray = (values - indices[:, None] - channels) % self.case.modulus
         finite: AnyArray = offsets[np.isfinite(values)]
         return finite
+
+    def in_order(self, batch: TactileSignal) -> bool:
+        """Return whether each channel holds 1 more than the one before; also of topics other than the fast one."""
+        steps = np.diff(batch.samples, axis=1) % self.case.modulus
+        return bool((steps == 1).all())
 
     def lateness_s(self, batch: TactileSignal) -> float:
         """Return by how much a stamp is later than its sample was taken."""
         samples = (batch.stamp_ns - self.start_ns) / NANOSECONDS * self.case.rate_hz
-        turn, late = self.case.modulus, samples - float(batch.samples[0, 0])
+        turn = self.case.modulus
+        late = samples + self.case.finger * turn // 4 - float(batch.samples[0, 0])
         return ((late + turn / 2) % turn - turn / 2) / self.case.rate_hz

@@ -91,6 +91,7 @@ def test_what_was_sampled_arrives_in_its_place_unit_and_time(make: Make, name: s
     for topic, units in rig.case.units.items():
         batch = topics[topic][-1]
         assert batch.units == (units if isinstance(units, tuple) else (units,) * len(batch.channels))
+        assert topic == rig.case.resting or rig.in_order(batch), f'{topic}: a channel is not in its place'
     for topic, rate_hz in rig.sensor.expected_rates_hz.items():
         assert {batch.sampling_rate_hz for batch in topics[topic]} == {rate_hz}
         assert all(after.stamp_ns > before.stamp_ns for before, after in pairwise(topics[topic]))
@@ -244,8 +245,7 @@ def test_after_a_brown_out_of_the_device_the_index_goes_on_with_the_time(make: M
     assert (last.first_sample - first.first_sample) / rig.case.rate_hz == pytest.approx(elapsed_s, abs=0.05)
 
 
-# One clock serves all; only without numbers and times in the packets does it follow by arrival alone.
-@pytest.mark.parametrize('name', [name for name in LINES if not LINES[name].numbered])
+@pytest.mark.parametrize('name', LINES)
 def test_a_clock_that_drifts_is_followed_and_reported(make: Make, name: str) -> None:
     rig = make(name, pace=1.004)
     rig.sensor.open()

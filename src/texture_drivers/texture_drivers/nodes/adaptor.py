@@ -62,6 +62,7 @@ class Adaptor(Node):
         self._received = self._lost = self._errors = 0
         self._fault = ''
         self._delivers = False
+        self._unmeasured = [name for name, adaptor in self._adaptors.items() if not adaptor.rate_hz]
         for adaptor in self._adaptors.values():
             wanted = adaptor.mapping
             self._listen(wanted.topic, wanted.type, adaptor.take)
@@ -84,6 +85,11 @@ class Adaptor(Node):
 
     def _publish(self) -> None:
         for name, adaptor in self._adaptors.items():
+            if adaptor.rate_hz and name in self._unmeasured:
+                self._unmeasured.remove(name)
+                self.get_logger().info(
+                    f"the rate of '{name}' was measured: {adaptor.rate_hz:g} Hz; set rate_hz in the mapping to keep it"
+                )
             for batch in adaptor.batches():
                 self._publishers_of[name].publish(to_msg(batch))
                 if not self._delivers:
@@ -93,6 +99,7 @@ class Adaptor(Node):
     def _report(self) -> DiagnosticReport:
         adaptors = list(self._adaptors.values())
         received, fault = self._received, self._fault
+        rate_fault = next((adaptor.fault for adaptor in adaptors if adaptor.fault), '')
         self._received, self._fault = 0, ''
         lost = sum(adaptor.lost for adaptor in adaptors)
         new, self._lost = lost - self._lost, lost
@@ -105,13 +112,14 @@ class Adaptor(Node):
                 'ERROR',
                 f'no message on {topics}{yet}; start the driver, or correct the topic in the mapping',
             ),
+            (bool(rate_fault), 'ERROR', rate_fault),
             (new > 0, 'WARN', f'{new} samples lost since the last report'),
             (not any(adaptor.samples for adaptor in adaptors), 'WARN', 'measuring rates and times'),
         )
         level, sentence = next(((level, text) for holds, level, text in conditions if holds), ('OK', 'converting'))
         self._errors = self._errors + 1 if level == 'ERROR' else 0
         if self._errors == QUIET_REPORTS:
-            self._delivers = False
+            self._delivers &= sentence == rate_fault  # with that samples may come
             self.get_logger().warning(sentence)
         values = {
             'samples': sum(adaptor.samples for adaptor in adaptors),
