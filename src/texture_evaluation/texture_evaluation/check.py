@@ -12,13 +12,14 @@ import numpy as np
 
 from texture_core.config import write_json
 from texture_core.errors import InvalidData
-from texture_core.types import Array, ExplorationRequest, Phase
+from texture_core.types import NANOSECONDS, Array, ExplorationRequest, Phase
 from texture_estimation.model import load_model, model_stem
 from texture_estimation.training import DAY_SUFFIX, adapted
 from texture_evaluation.train import training_examples
 from texture_features.correction import (
     CORRECTION,
     RESPONSE_DB,
+    SIGNAL_TO_REST,
     SLIDE_NUMBERS,
     Correction,
     InputComparison,
@@ -33,6 +34,8 @@ from texture_recordings.dataset import SlideDataset
 from texture_recordings.slides import LabelledSlide, SlideSamples
 
 TOUCH_NS = 200_000_000  # the skin feels a touch before the arm does
+# An arm without a new command for longer stops and sets off with a jerk, which no finger would show otherwise.
+PAUSE_S = 0.1
 UNMEASURED = 'noise and drift were not measured, as too little was recorded before the touch'
 
 
@@ -40,6 +43,7 @@ def statistics_of(
     slide: LabelledSlide, topics: Iterable[str], correction: Correction | None = None
 ) -> dict[str, InputStatistics]:
     """Return what a slide over the reference plate shows of each input, as the correction of a model leaves it."""
+    _check_steady(slide)
     found = {}
     for topic in topics:
         batches = slide.signals.get(topic, ())
@@ -55,6 +59,29 @@ def statistics_of(
             rest = correction.apply(topic, WindowBatch(rest, one.rate_hz)).samples if len(rest) else rest
         found[topic] = InputStatistics.of(samples, rest, one.rate_hz, one.channels, batches[0].sensor)
     return found
+
+
+def _check_steady(slide: LabelledSlide) -> None:
+    """Raise InvalidData if the finger paused in the slide: late states, or several at one place."""
+    first, *others = slide.sliding
+    places = [first, *(one for last, one in pairwise([first, *others]) if (one.x_m, one.y_m) != (last.x_m, last.y_m))]
+    pause_s = max((after.stamp_ns - before.stamp_ns for before, after in pairwise(places)), default=0) / NANOSECONDS
+    if pause_s > PAUSE_S:
+        raise InvalidData(
+            f'the arm paused for {1e3 * pause_s:.0f} ms in the slide over the plate ({1e3 * PAUSE_S:.0f} ms are '
+            'allowed), so it shows nothing about the finger; stop other programs on the computer, and repeat'
+        )
+
+
+def _check_signal(found: Mapping[str, InputStatistics]) -> None:
+    """Raise InvalidData if the slide is hardly above the rest: neither a reference nor a correction can be of it."""
+    for topic, one in found.items():
+        if np.median(one.rms) < SIGNAL_TO_REST * np.median(one.rest_rms):
+            raise InvalidData(
+                f"the slide over the plate has {np.median(one.rms):.3g} rms in '{topic}' and the rest before it "
+                f'{np.median(one.rest_rms):.3g}: too little signal; see that the finger touches the plate, or take a '
+                'rougher one'
+            )
 
 
 def _at_rest(slide: LabelledSlide, topic: str) -> Array:
@@ -79,6 +106,7 @@ def store_reference(
     if len(slides) < 2:
         raise InvalidData('one slide over the plate does not show repeatability; record two, and store again')
     before, last = (statistics_of(slide, topics) for slide in slides[-2:])
+    _check_signal(last)
     if faults := _faults({topic: compare(before[topic], last[topic]) for topic in last}):
         raise InvalidData(
             f'nothing is stored, for two slides over the plate differ: {"; ".join(faults)}. Clean and fasten the '
@@ -128,6 +156,7 @@ def check_finger(
     sentence = f'the finger is not as trained: {"; ".join(faults)}'
     if not correct:
         return False, f'{sentence}. Check that this is the reference plate; clean or replace the skin, or use --correct'
+    _check_signal(today)
     write_json(Correction.of(found).as_mapping(), path)
     return False, f"{sentence}. The model is corrected, '{path}': start the nodes again with its model card as recipe"
 
@@ -138,8 +167,11 @@ def adapt_to_today(model: str | Path, bags: Sequence[str | Path], today: Sequenc
     feature_set, out = trained.recipe.feature_set, f'{model_stem(model)}{DAY_SUFFIX}'
     shots = SlideDataset.from_bags(today, topics=feature_set.topics)
     examples = training_examples(trained.recipe, SlideDataset.from_bags(bags, topics=feature_set.topics))
-    adapted(trained, examples, shots.features(feature_set)).save(out)
-    return f"'{out}' is adapted to {len(shots)} slides of today; it names surfaces and rejects them all"
+    today_model = adapted(trained, examples, shots.features(feature_set))
+    today_model.save(out)
+    return (
+        f"'{out}' is adapted to {len(shots)} slides of today; it rejects every label: {today_model.acceptance.reason}"
+    )
 
 
 def _faults(found: Mapping[str, InputComparison]) -> list[str]:

@@ -539,12 +539,18 @@ def _check(options: argparse.Namespace) -> int:
 
 
 def plate_request(options: argparse.Namespace, stored: Mapping[str, float]) -> ExplorationRequest:
-    """Return the slide over the plate: an option goes before what is stored with the reference."""
+    """Return the slide over the plate, which is that of the reference: another one shows nothing about the finger."""
     numbers: dict[str, Any] = {}
-    for option, (field, _, _, usual) in PLATE_NUMBERS.items():
-        given = getattr(options, option)
-        in_rad = math.radians if option == 'direction' else float
+    for option, (field, unit, _, usual) in PLATE_NUMBERS.items():
+        given, (in_rad, shown) = getattr(options, option), (float, float)
+        if option == 'direction':
+            in_rad, shown = math.radians, math.degrees
         numbers[field] = stored.get(field, usual) if given is None else in_rad(given)
+        if not math.isclose(numbers[field], made := stored.get(field, numbers[field])):
+            raise InvalidParameter(
+                f'--{option} is {given:g} {unit}, and the reference was made with {shown(made):g} {unit}; leave it '
+                'out, or store a reference with it by --store'
+            )
     return ExplorationRequest('linear_slide', surface=PLATE, **numbers)
 
 
