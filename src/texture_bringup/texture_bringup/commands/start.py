@@ -5,11 +5,13 @@
 from __future__ import annotations
 
 import argparse
+import fcntl
 import os
 import signal
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from importlib import import_module
 from multiprocessing import get_context
@@ -24,6 +26,7 @@ from texture_bringup.launcher import (
     read,
 )
 from texture_core.cli import Command, add_namespace, add_parameters, add_seed, parameters_from, task
+from texture_core.errors import LaunchFailed
 
 # Each command imports what it starts when it runs: a launcher is a child of many programs, and is up sooner without.
 # ruff: noqa: PLC0415
@@ -40,7 +43,25 @@ def _launch(options: argparse.Namespace) -> int:
     given = given_arguments(options.arguments)
     nodes = read(find_launch_file(options.file), given, os.environ)
     refuse_wrong(nodes, set(given.values()))
-    return Supervisor(nodes, _say, together=options.together).run()
+    with ExitStack() as claims:
+        for node in nodes:
+            for one in node.parameters if node.executable == 'emulator' else ():
+                if isinstance(one, Mapping) and 'finger_pipe' in one:
+                    claims.enter_context(claimed(Path(str(one['finger_pipe']))))
+        return Supervisor(nodes, _say, together=options.together).run()
+
+
+@contextmanager
+def claimed(pipe: Path) -> Iterator[None]:
+    """Claim the devices of an emulator for a launch: before its pipe is made, the sensor of another would read them."""
+    with pipe.expanduser().with_suffix('.launch').open('w') as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise LaunchFailed(
+                f"another launch has the emulated devices in '{pipe.parent}'; end it, or give this one a namespace"
+            ) from error
+        yield
 
 
 # By program: the function that loads the first of these parameters, and refuses what the node would refuse.
