@@ -29,7 +29,7 @@ DOMAIN = 62
 
 @contextmanager
 def silent_explorer(taken=None, goals=None, begin=None, result=None):
-    """An explorer that takes a goal once `begin` is set, sets `taken`, and answers `result`, if any; `goals` are taken."""
+    """An explorer that takes a goal once `begin` is set, sets `taken`, answers `result`, if any; `goals` are taken."""
     context, over, left = Context(), threading.Event(), threading.Event()
     taken = taken or threading.Event()
     context.init(domain_id=DOMAIN)

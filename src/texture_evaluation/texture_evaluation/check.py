@@ -19,7 +19,6 @@ from texture_evaluation.train import training_examples
 from texture_features.correction import (
     CORRECTION,
     RESPONSE_DB,
-    SIGNAL_TO_REST,
     SLIDE_NUMBERS,
     Correction,
     InputComparison,
@@ -40,9 +39,12 @@ UNMEASURED = 'noise and drift were not measured, as too little was recorded befo
 
 
 def statistics_of(
-    slide: LabelledSlide, topics: Iterable[str], correction: Correction | None = None
+    slide: LabelledSlide, topics: Iterable[str], correction: Correction | None = None, *, weak: bool = False
 ) -> dict[str, InputStatistics]:
-    """Return what a slide over the reference plate shows of each input, as the correction of a model leaves it."""
+    """Return what a slide over the reference plate shows of each input, as the correction of a model leaves it.
+
+    A `weak` one may be hardly above the rest: that is a finding, but no reference, and nothing is corrected by it.
+    """
     _check_steady(slide)
     found = {}
     for topic in topics:
@@ -57,31 +59,20 @@ def statistics_of(
         if correction is not None:
             samples = correction.apply(topic, WindowBatch(samples, one.rate_hz)).samples
             rest = correction.apply(topic, WindowBatch(rest, one.rate_hz)).samples if len(rest) else rest
-        found[topic] = InputStatistics.of(samples, rest, one.rate_hz, one.channels, batches[0].sensor)
+        found[topic] = InputStatistics.of(samples, rest, one.rate_hz, one.channels, batches[0].sensor, weak=weak)
     return found
 
 
 def _check_steady(slide: LabelledSlide) -> None:
     """Raise InvalidData if the finger paused in the slide: late states, or several at one place."""
-    first, *others = slide.sliding
-    places = [first, *(one for last, one in pairwise([first, *others]) if (one.x_m, one.y_m) != (last.x_m, last.y_m))]
-    pause_s = max((after.stamp_ns - before.stamp_ns for before, after in pairwise(places)), default=0) / NANOSECONDS
+    moves = (one for last, one in pairwise(slide.sliding) if (one.x_m, one.y_m) != (last.x_m, last.y_m))
+    stamps = [one.stamp_ns for one in (*slide.sliding[:1], *moves)]
+    pause_s = float(np.diff(stamps).max(initial=0)) / NANOSECONDS
     if pause_s > PAUSE_S:
         raise InvalidData(
             f'the arm paused for {1e3 * pause_s:.0f} ms in the slide over the plate ({1e3 * PAUSE_S:.0f} ms are '
             'allowed), so it shows nothing about the finger; stop other programs on the computer, and repeat'
         )
-
-
-def _check_signal(found: Mapping[str, InputStatistics]) -> None:
-    """Raise InvalidData if the slide is hardly above the rest: neither a reference nor a correction can be of it."""
-    for topic, one in found.items():
-        if np.median(one.rms) < SIGNAL_TO_REST * np.median(one.rest_rms):
-            raise InvalidData(
-                f"the slide over the plate has {np.median(one.rms):.3g} rms in '{topic}' and the rest before it "
-                f'{np.median(one.rest_rms):.3g}: too little signal; see that the finger touches the plate, or take a '
-                'rougher one'
-            )
 
 
 def _at_rest(slide: LabelledSlide, topic: str) -> Array:
@@ -106,7 +97,6 @@ def store_reference(
     if len(slides) < 2:
         raise InvalidData('one slide over the plate does not show repeatability; record two, and store again')
     before, last = (statistics_of(slide, topics) for slide in slides[-2:])
-    _check_signal(last)
     if faults := _faults({topic: compare(before[topic], last[topic]) for topic in last}):
         raise InvalidData(
             f'nothing is stored, for two slides over the plate differ: {"; ".join(faults)}. Clean and fasten the '
@@ -130,7 +120,7 @@ def check_finger(
 
     It is compared as the nodes see it: through the correction of the model, if there is one.
     """
-    today = statistics_of(slide, topics)
+    today = statistics_of(slide, topics, weak=not correct)
     if missing := sorted(set(today) - set(reference)):
         raise InvalidData(f"the reference holds no '{missing[0]}'; store it again by --store")
     found = {topic: compare(reference[topic], one) for topic, one in today.items()}
@@ -138,7 +128,7 @@ def check_finger(
     path, correction = file_next_to(model, CORRECTION), read_correction(model)
     # Without the option the nodes keep the correction, so what it leaves is what counts.
     if correction is not None and not correct:
-        seen = statistics_of(slide, topics, correction)
+        seen = statistics_of(slide, topics, correction, weak=True)
         left = {topic: compare(reference[topic], one) for topic, one in seen.items()}
         if not _faults(left):
             return True, f"with its correction, '{path}', {_claim(left)}"
@@ -156,7 +146,6 @@ def check_finger(
     sentence = f'the finger is not as trained: {"; ".join(faults)}'
     if not correct:
         return False, f'{sentence}. Check that this is the reference plate; clean or replace the skin, or use --correct'
-    _check_signal(today)
     write_json(Correction.of(found).as_mapping(), path)
     return False, f"{sentence}. The model is corrected, '{path}': start the nodes again with its model card as recipe"
 

@@ -95,6 +95,7 @@ def test_slides_that_prove_nothing_are_refused_with_what_to_do():
     for samples, rest, message in (
         (slide(seconds=1.0), None, 'slide for 2 s or longer'),
         (np.clip(slide(), -50.0, 50.0), None, 'the sensor is saturated; press less'),
+        (slide(), slide(3), 'too little signal; see that the finger touches the plate'),
     ):
         with pytest.raises(InvalidData, match=message):
             found(samples, rest)

@@ -27,7 +27,7 @@ SEGMENT_S = 0.25  # of a spectrum: resolves 4 Hz
 MIN_SEGMENTS = 8  # of a slide: fewer leave the spectrum uncertain by more than 1 dB
 SATURATED_FRACTION = 0.01  # samples of a channel at its lowest or highest value
 DISTINCT = 100  # a channel with fewer values is too coarse
-SIGNAL_TO_REST = 2.0  # least rms of a slide over that at rest, as a reference or for a correction
+SIGNAL_TO_REST = 2.0  # least rms of the slide over that at rest
 FLOOR = 1e-12
 
 
@@ -44,8 +44,13 @@ class InputStatistics:
     rest_level: Array
 
     @classmethod
-    def of(cls, samples: Array, rest: Array, rate_hz: float, channels: Sequence[str], sensor: str) -> InputStatistics:
-        """Measure them on samples while sliding, (n, n_channels), and at rest, (m, n_channels) or empty."""
+    def of(
+        cls, samples: Array, rest: Array, rate_hz: float, channels: Sequence[str], sensor: str, *, weak: bool = False
+    ) -> InputStatistics:
+        """Measure them on samples while sliding, (n, n_channels), and at rest, (m, n_channels) or empty.
+
+        Only a `weak` slide may be hardly above the rest.
+        """
         length = round(SEGMENT_S * rate_hz)
         if len(samples) < MIN_SEGMENTS * length:
             raise InvalidData(
@@ -67,6 +72,12 @@ class InputStatistics:
             # Of the typical stretch: the arm may set off, or the level settle, in some.
             stretches = rest[: len(rest) // length * length].reshape(-1, length, rest.shape[1])
             rest_rms, rest_level = np.median(stretches.std(axis=1), axis=0), np.median(rest, axis=0)
+        if not weak and float(np.median(rms)) < SIGNAL_TO_REST * float(np.median(rest_rms)):
+            raise InvalidData(
+                f'the slide over the plate has {np.median(rms):.3g} rms and the rest before it '
+                f'{np.median(rest_rms):.3g}: too little signal; see that the finger touches the plate, or slide faster '
+                'or harder'
+            )
         starts = np.arange(0, len(samples) - length + 1, length // 2)
         segments = np.stack([samples[start : start + length] for start in starts])
         segments = (segments - segments.mean(axis=1, keepdims=True)) * np.hanning(length)[:, None]

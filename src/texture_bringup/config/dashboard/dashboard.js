@@ -6,6 +6,7 @@ const RETRY_MS = 1000;
 const SILENT_MS = 3000;
 const FRAME_MS = 100;
 const BARS = 6;
+const NARROW = 500;
 const CURVES = ['--accent', '--second', '--third'];
 const AXIS = { left: 48, bottom: 18, top: 14 };
 const MAX_FRAMES = 300; // of one exploration; a longer one is thinned to every second frame, again and again
@@ -94,12 +95,10 @@ function drawAxes({ pen, width, height }, { x, y, xTicks, yTicks, xUnit, yUnit }
     pen.fillText(`${Number(value.toPrecision(3))}`, AXIS.left - 6, y(value));
   });
   pen.textBaseline = 'alphabetic';
-  const texts = xTicks.map((value, k) => `${Number(value.toPrecision(3))}${k === xTicks.length - 1 ? ` ${xUnit}` : ''}`);
-  const end = x(xTicks[xTicks.length - 1]) - pen.measureText(texts[texts.length - 1]).width - 6;
   xTicks.forEach((value, k) => {
-    if (k < xTicks.length - 1 && x(value) + pen.measureText(texts[k]).width / 2 > end) return; // no room
+    if (k === xTicks.length - 2 && width < NARROW) return; // no room next to the unit
     pen.textAlign = k === xTicks.length - 1 ? 'right' : 'center';
-    pen.fillText(texts[k], x(value), height - 3);
+    pen.fillText(`${Number(value.toPrecision(3))}${k === xTicks.length - 1 ? ` ${xUnit}` : ''}`, x(value), height - 3);
   });
   pen.stroke();
   pen.textAlign = 'left';

@@ -9,9 +9,8 @@ import fcntl
 import os
 import signal
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from importlib import import_module
 from multiprocessing import get_context
@@ -43,25 +42,7 @@ def _launch(options: argparse.Namespace) -> int:
     given = given_arguments(options.arguments)
     nodes = read(find_launch_file(options.file), given, os.environ)
     refuse_wrong(nodes, set(given.values()))
-    with ExitStack() as claims:
-        for node in nodes:
-            for one in node.parameters if node.executable == 'emulator' else ():
-                if isinstance(one, Mapping) and 'finger_pipe' in one:
-                    claims.enter_context(claimed(Path(str(one['finger_pipe']))))
-        return Supervisor(nodes, _say, together=options.together).run()
-
-
-@contextmanager
-def claimed(pipe: Path) -> Iterator[None]:
-    """Claim the devices of an emulator for a launch: before its pipe is made, the sensor of another would read them."""
-    with pipe.expanduser().with_suffix('.launch').open('w') as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            raise LaunchFailed(
-                f"another launch has the emulated devices in '{pipe.parent}'; end it, or give this one a namespace"
-            ) from error
-        yield
+    return Supervisor(nodes, _say, together=options.together).run()
 
 
 # By program: the function that loads the first of these parameters, and refuses what the node would refuse.
@@ -88,12 +69,14 @@ def refuse_wrong(nodes: Sequence[NodeDescription], given: set[str]) -> None:
     In a separate process: a launcher that stays needs none of their libraries.
     """
     wanted: list[tuple[str, ...]] = []
+    folders = set()
     for node in nodes:
         module, load, *names = LOOKED_AT.get(node.executable, ('', ''))
         known = {name: value for one in node.parameters if isinstance(one, Mapping) for name, value in one.items()}
         values = [str(known.get(name, '')) for name in names]
         if node.executable == 'emulator' and 'finger_pipe' in known:  # one uses it; else a recorder has made its bag
             wanted.append(('texture_core.types', 'FingerReceiver', str(known['finger_pipe'])))
+            folders.add(Path(str(known['finger_pipe'])).expanduser().parent)
         if all(values) and given.intersection(values):
             wanted.append((module, load, *values))
     if wanted:
@@ -102,6 +85,18 @@ def refuse_wrong(nodes: Sequence[NodeDescription], given: set[str]) -> None:
             with task('checking the files that the launch names'):  # behind the fork, which copies no thread
                 for check in checks:
                     check.result()
+    for folder in folders:
+        claim(folder)
+
+
+def claim(folder: Path) -> None:
+    """Hold the folder of emulated devices until this process ends: the sensor of a second launch would read them."""
+    try:
+        fcntl.flock(os.open(folder, os.O_RDONLY), fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        raise LaunchFailed(
+            f"another launch has the emulated devices in '{folder}'; end it, or give this one a namespace"
+        ) from error
 
 
 def _say(line: str) -> None:
