@@ -159,7 +159,7 @@ def test_lost_samples_are_reported_once_and_at_the_end(collected, tmp_path, monk
     monkeypatch.setattr(explore, '_evaluate_bag', lambda *_: PlaceAccuracy(2, 0))
     end, bag = collected(Explorer(DONE, DONE), losses='2970 samples lost', places=2)
     assert (end.error, end.slides, bag) == (CollectionError.NONE, 2, tmp_path / 'cork')
-    assert end.message.endswith('; 2970 samples lost')
+    assert '; 2970 samples lost; windows with a gap are left out of features and training; ' in end.message
     assert capsys.readouterr().out.splitlines()[0] == '1 slide: 2970 samples lost'
 
 

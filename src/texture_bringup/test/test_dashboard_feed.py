@@ -92,6 +92,19 @@ def test_a_past_exploration_is_listed_with_its_rejection(rejection, listed) -> N
     assert feed.frame(0.0)['past'][0]['label'] == listed
 
 
+def test_a_finger_that_may_press_after_a_restart_of_the_explorer_is_a_warning_until_it_is_lifted() -> None:
+    feed = Feed()
+    free, unknown = (ExplorationState(2, '', '', Phase.IDLE, lifted=lifted) for lifted in (True, False))
+    feed.on_state(unknown)
+    assert feed.frame(0.0)['warning'] == ''  # nothing was touched yet
+    feed.on_state(sliding('a'))
+    assert feed.frame(0.0)['warning'] == ''
+    feed.on_state(unknown)
+    assert feed.frame(0.0)['warning'] == 'the finger may still press: look at the robot, and call `texture lift`'
+    feed.on_state(free)
+    assert feed.frame(0.0)['warning'] == ''
+
+
 ELSEWHERE = 'trained at one place of each surface: elsewhere it may be rejected'
 
 

@@ -76,7 +76,9 @@ def test_an_answer_is_as_expected_if_label_and_rejection_are(
     assert Slide('glass', 'glass', expected, answer, []).as_expected is as_expected
 
 
-def test_the_picture_dots_what_is_before_the_first_estimate_and_has_times_below_each_panel(tmp_path, monkeypatch) -> None:
+def test_the_picture_dots_what_is_before_the_first_estimate_and_has_times_below_each_panel(
+    tmp_path, monkeypatch
+) -> None:
     figure = Figure()
     monkeypatch.setattr(demo, 'chart', lambda *_: nullcontext(figure))
     seen = [

@@ -143,6 +143,7 @@ def test_the_help_lists_the_motions(capsys):
 
 
 USUAL = {'speed_m_s': 0.05, 'force_n': 0.0, 'distance_m': 0.15, 'direction_rad': 0.0}
+SLOWER = {'speed_m_s': 0.02, 'distance_m': 0.1}
 STORED = {'speed_m_s': 0.03, 'force_n': 5.0, 'distance_m': 0.08, 'direction_rad': math.pi / 2}
 
 
@@ -152,15 +153,12 @@ STORED = {'speed_m_s': 0.03, 'force_n': 5.0, 'distance_m': 0.08, 'direction_rad'
         (STORED, (), STORED),
         ({}, (), USUAL),  # a reference without the numbers of its slide
         ({'force_n': 5.0}, (), {**USUAL, 'force_n': 5.0}),
-        (STORED, ('--force', '4', '--direction', '180'), {**STORED, 'force_n': 4.0, 'direction_rad': math.pi}),
-        (STORED, ('--force', '0', '--direction', '0'), {**STORED, 'force_n': 0.0, 'direction_rad': 0.0}),
-        (STORED, ('--speed', '0.02', '--distance', '0.1'), {**STORED, 'speed_m_s': 0.02, 'distance_m': 0.1}),
+        (STORED, ('--force', '5', '--direction', '90'), STORED),
+        ({'force_n': 5.0}, ('--speed', '0.02', '--distance', '0.1'), {**USUAL, **SLOWER, 'force_n': 5.0}),
         (STORED, ('--store',), USUAL),  # another slide becomes the reference
     ],
 )
-def test_a_check_repeats_the_slide_of_the_reference_unless_it_is_told_otherwise(
-    monkeypatch, tmp_path, stored, options, made
-):
+def test_a_check_repeats_the_slide_of_the_reference(monkeypatch, tmp_path, stored, options, made):
     asked = []
 
     def slide(_bag, request, _namespace, _count):
@@ -174,3 +172,12 @@ def test_a_check_repeats_the_slide_of_the_reference_unless_it_is_told_otherwise(
     [request] = asked
     assert {name: getattr(request, name) for name in made} == pytest.approx(made)
     assert (request.motion, request.surface) == ('linear_slide', 'reference plate')
+
+
+def test_a_check_by_another_slide_than_that_of_the_reference_is_refused(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr('texture_estimation.model.load_model', lambda _path: MagicMock())
+    write_reference(tmp_path / 'model', {}, STORED)
+    assert main(['check', str(tmp_path / 'model'), '--force', '4']) == 2
+    assert '--force is 4 N, and the reference was made with 5 N; leave it out' in capsys.readouterr().err
+    assert main(['check', str(tmp_path / 'model'), '--direction', '0']) == 2
+    assert '--direction is 0 degrees, and the reference was made with 90 degrees' in capsys.readouterr().err

@@ -145,8 +145,9 @@ def test_a_node_that_dies_is_named_with_its_code_and_the_others_go_on(launch) ->
     ('script', 'attributes', 'expected', 'cause'),
     [
         ('echo "[ERROR] why"; exit 3', 'on_exit="shutdown"', (1, 1), 'died with exit code 3: [ERROR] why'),
-        # The last line of a node that works says nothing of its end.
+        # The last line of a node that works says nothing of its end, nor does an old warning of one that is killed.
         ('echo "[INFO] why"; kill -9 $$', 'on_exit="shutdown"', (1, 1), 'was killed by SIGKILL'),
+        ('echo "[WARN] why"; kill -9 $$', 'on_exit="shutdown"', (1, 1), 'was killed by SIGKILL'),
         (
             'echo KeyError: why; exit 3',
             'respawn="true" respawn_max_retries="2"',
@@ -171,6 +172,15 @@ def test_the_end_of_a_killed_explorer_says_that_the_arm_may_continue_to_press(la
     launched = launch({'good': GOOD, 'explorer': end}, explorer='on_exit="shutdown"')
     assert launched.end() in (1, 2)
     assert ('; the arm may continue to press: raise the finger' in launched.lines[-1]) == presses
+
+
+def test_of_a_killed_explorer_that_is_restarted_the_sentence_names_the_lift(launch) -> None:
+    launched = launch({'explorer': GOOD}, explorer='respawn="true"')
+    os.kill(launched.ready(), signal.SIGKILL)
+    assert 'the finger may still press: look at the robot, and call `texture lift`' in launched.wait_for('SIGKILL')
+    launched.ready()
+    launched.process.send_signal(signal.SIGINT)
+    assert launched.end() == 0
 
 
 def test_a_node_that_may_be_restarted_comes_back(launch) -> None:

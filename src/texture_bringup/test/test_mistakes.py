@@ -12,6 +12,7 @@ import pytest
 pytestmark = pytest.mark.ros  # some sub-commands are nodes
 
 from texture_bringup.command import main
+from texture_bringup.commands.start import claim
 from texture_core.types import ExplorationState, FingerReceiver, TactileSignal
 from texture_recordings.bags import BagWriter, read_bag
 from texture_simulation.offline import SlidePlan, write_simulated
@@ -82,6 +83,14 @@ def test_a_second_emulator_is_refused_before_a_bag_is_made(capsys, tmp_path) -> 
     assert 'another emulator uses the pipe' in refused(launch, capsys)
     assert not (tmp_path / 'bag').exists()
     running.close()
+
+
+def test_of_two_emulators_that_start_at_once_the_second_starts_no_node(capsys, tmp_path) -> None:
+    claim(tmp_path)
+    said = refused(['launch', 'emulator', f'devices:={tmp_path}'], capsys)
+    assert said == (
+        f"texture: another launch has the emulated devices in '{tmp_path}'; end it, or give this one a namespace\n"
+    )
 
 
 def test_the_models_are_good_and_the_figures_are_written(data, capsys, tmp_path) -> None:

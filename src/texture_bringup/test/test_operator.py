@@ -29,8 +29,8 @@ DOMAIN = 62
 
 
 @contextmanager
-def silent_explorer(taken=None, goals=None, begin=None):
-    """An explorer that takes a goal once `begin` is set, sets `taken`, and never answers; `goals` are those taken."""
+def silent_explorer(taken=None, goals=None, begin=None, result=None):
+    """An explorer that takes a goal once `begin` is set, sets `taken`, answers `result`, if any; `goals` are taken."""
     context, over, left = Context(), threading.Event(), threading.Event()
     taken = taken or threading.Event()
     context.init(domain_id=DOMAIN)
@@ -39,10 +39,11 @@ def silent_explorer(taken=None, goals=None, begin=None):
     def hang(goal):
         taken.set()
         (goals if goals is not None else []).append(goal)
-        over.wait(60.0)
+        if result is None:
+            over.wait(60.0)
         goal.abort()
         executor.create_task(left.set)  # after what this answer asks of the executor
-        return action.Explore.Result()
+        return action.Explore.Result(**{} if result is None else {'result': result})
 
     server = ActionServer(node, action.Explore, 'explore', hang, cancel_callback=lambda _goal: CancelResponse.ACCEPT)
     node.create_service(Trigger, 'explorer/stop', lambda _request, answer: answer)
@@ -91,9 +92,18 @@ def test_an_explorer_that_was_started_again_is_not_waited_for(monkeypatch):
         operator.wait_for_explorer(30.0)
         second = threading.Timer(1.0, lambda: later.enter_context(silent_explorer()))
         second.start()
-        with pytest.raises(MotionAborted, match='was restarted'):
+        with pytest.raises(MotionAborted, match=r'was restarted.*; the finger may still press: .* call `texture lift`'):
             operator.explore(ExplorationRequest('linear_slide'))
         second.join()
+
+
+@pytest.mark.parametrize(('lifted', 'ending'), [(True, 'shut down; the finger was lifted'), (False, 'shut down')])
+def test_an_aborted_exploration_says_that_the_finger_was_lifted_if_that_is_known(lifted, ending):
+    code, message = msg.ExplorationResult.ERROR_STOPPED, 'the explorer was shut down'
+    result = msg.ExplorationResult(error_code=code, message=message, exploration_id='a', lifted=lifted)
+    with silent_explorer(result=result), operators.Operator(domain_id=DOMAIN) as operator:
+        operator.wait_for_explorer(30.0)
+        assert operator.explore(ExplorationRequest('linear_slide')).message == f'the explorer was {ending}'
 
 
 def test_an_explorer_that_does_not_keep_the_timeout_is_left(monkeypatch):

@@ -11,6 +11,7 @@ import hmac
 import ipaddress
 import json
 import os
+import re
 import secrets
 import socket
 import threading
@@ -170,7 +171,8 @@ class Recorder:
             return 'nothing is being recorded'
         child.stop()
         bag, self.bag = self.bag, ''
-        return f"'{bag}' is complete"
+        ends = re.findall(r'is complete(: .*)', child.log.read_text(errors='replace'))
+        return f"'{bag}' is complete{ends[-1] if ends else ''}"
 
     def watch(self) -> None:
         """Note a recording that ended on an error."""

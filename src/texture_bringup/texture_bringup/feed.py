@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_bringup.launcher import PRESSES
+from texture_bringup.launcher import MAY_PRESS, PRESSES
 from texture_core.types import (
     ENDED,
     ExplorationState,
@@ -309,7 +309,10 @@ class Feed:
     def frame(self, time_s: float) -> dict[str, Any]:
         """Return everything that is shown at a time of the monotonic clock, s, as JSON can carry it."""
         self._began_s = min(self._began_s, time_s)
+        # As after the restart of an explorer that was killed; one that has not explored yet touches nothing.
+        unknown = self._state.phase is Phase.IDLE and not self._state.lifted and bool(self._past)
         return {
+            'warning': MAY_PRESS if unknown else '',
             'signal': self._signal(),
             'spectrum': self._spectrum(),
             'taxels': self._image(),

@@ -248,6 +248,7 @@ def ending(returncode: int) -> str:
 
 EXPLORER = 'explorer'  # the program whose parameter files are for it alone
 # One that was killed or failed lifts no finger.
+MAY_PRESS = 'the finger may still press: look at the robot, and call `texture lift`'  # of one that runs again
 PRESSES = 'the arm may continue to press: raise the finger by freedrive or pendant before you launch again'
 
 
@@ -351,13 +352,13 @@ class Supervisor:
         needed = node.needed or node.respawn or (self._together and code != 0)
         if code != 0 and not (stopping or restart):
             self._code = MISTAKE if code == MISTAKE and needed else 1
-        pressing = f'; {PRESSES}' * (node.executable == EXPLORER and code not in (0, MISTAKE))
+        pressing = f'; {MAY_PRESS if restart else PRESSES}' * (node.executable == EXPLORER and code not in (0, MISTAKE))
         self._say(f'[launch] {node.label} {ending(code)}{pressing}')
         if restart:
             self._due.append((time.monotonic() + node.respawn_delay_s, node, process.deaths + 1))
         elif needed and not stopping:
             self._say(f'[launch] {node.label} is required by the other nodes, which are stopped now')
-            fault = f': {process.fault}' * bool(code and process.fault)
+            fault = f': {process.fault}' * bool(code > 0 and process.fault)  # what is killed gives no reason
             self._cause = f'{node.label} {ending(code)}{fault}{pressing}'
             self.stop()
 

@@ -34,7 +34,7 @@ from std_srvs.srv import Trigger
 from texture_msgs import action, msg, srv
 
 from texture_bringup.feed import Feed
-from texture_bringup.launcher import typed
+from texture_bringup.launcher import MAY_PRESS, typed
 from texture_core.cli import task
 from texture_core.config import unknown_name
 from texture_core.errors import (
@@ -166,7 +166,7 @@ STEPS: Mapping[bool, Mapping[str, int]] = {
     True: {'unconfigured': Transition.TRANSITION_CONFIGURE, 'inactive': Transition.TRANSITION_ACTIVATE},
     False: {'active': Transition.TRANSITION_DEACTIVATE},
 }
-RESTARTED = 'the explorer was restarted and does not know this exploration, which was aborted'
+RESTARTED = f'the explorer was restarted and does not know this exploration, which was aborted; {MAY_PRESS}'
 VANISHED = (
     'the explorer has vanished; if it was exploring, the finger may still touch the surface: look at the robot, and at '
     'the output of the explorer'
@@ -195,6 +195,11 @@ def _given_up(goal: Any, why: str) -> MotionAborted:
     """Cancel a request that is given up, as an explorer that only hung must not begin it later; return the error."""
     goal.cancel_goal_async()
     return MotionAborted(why)
+
+
+def _message(result: Any) -> str:
+    """Return how an exploration ended, and of an aborted one that the finger was lifted, if that is known."""
+    return f'{result.message}{"; the finger was lifted" * bool(result.error_code and result.lifted)}'
 
 
 def _unconfirmed() -> str:
@@ -343,7 +348,7 @@ class Operator:
         result = answer.result.result
         return ExplorationResult(
             ExplorationError(result.error_code),
-            result.message,
+            _message(result),
             result.exploration_id,
             from_msg(result.texture),
             from_msg(result.roughness),
@@ -551,4 +556,4 @@ class Operator:
             self._complete(ending, CANCEL_DEADLINE_S)
         if not ending.done():
             return _unconfirmed()
-        return f'the exploration has ended: {ending.result().result.result.message}'
+        return f'the exploration has ended: {_message(ending.result().result.result)}'

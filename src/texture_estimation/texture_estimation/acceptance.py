@@ -334,9 +334,10 @@ class Acceptance:
         if not short and self.slides >= needed:
             return ''
         fewest = f", and {min(short.values())} of '{min(short, key=lambda label: short[label])}'" if short else ''
+        none = '' if self.slides else ' (none in an adaptation to today; train instead)'
         return (
-            f'too little training: {self.slides} slides could be held out{fewest}; to accept a label {needed:g} are '
-            f'needed, and {LEAST_SLIDES_A_LABEL} of each surface'
+            f'too little training: {self.slides} slides could be held out{none}{fewest}; to accept a label '
+            f'{needed:g} are needed, and {LEAST_SLIDES_A_LABEL} of each surface'
         )
 
     @cached_property

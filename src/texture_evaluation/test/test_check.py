@@ -89,6 +89,47 @@ def test_a_slide_with_lost_samples_is_refused_with_advice_for_an_operator(traine
         check_finger(model, TOPICS, {}, replace(slides[2], signals=signals))
 
 
+def paused(slide, count, name):
+    """A slide, with a state each 100 ms, in which `count` states are missing, or show the finger at one place."""
+    moved = [replace(one, x_m=1e-3 * number, y_m=0.0) for number, one in enumerate(slide.sliding)]
+    still = [replace(one, x_m=moved[20].x_m) for one in moved[21 : 21 + count]] if name == 'still' else []
+    others = [one for one in slide.states if one.phase is not Phase.SLIDE]
+    return replace(slide, states=[*others, *moved[:21], *still, *moved[21 + count :]])
+
+
+@pytest.mark.parametrize('name', ['late', 'still'])
+def test_a_slide_in_which_the_arm_paused_is_refused_and_gives_no_verdict(trained, name):
+    model, slides = trained
+    store_reference(model, TOPICS, slides[:2])
+    assert check(model, paused(slides[2], 0, name))[0]
+    for slide in (paused(slides[2], 1, name), louder(paused(slides[2], 1, name), 2.0)):
+        with pytest.raises(InvalidData, match=r'the arm paused for 200 ms in the slide .*\(100 ms are .*, and repeat$'):
+            check(model, slide)
+    with pytest.raises(InvalidData, match='the arm paused'):
+        store_reference(model, TOPICS, [slides[0], paused(slides[1], 1, name)])
+
+
+def test_a_finger_that_became_weak_gets_a_verdict_but_no_reference_and_no_correction(trained):
+    model, slides = trained
+    store_reference(model, TOPICS, slides[:2])
+    faint = 0.5 * np.random.default_rng(2).standard_normal((60_000, 1)).astype(np.float32)
+    first = slides[2].signals['signal'][0]
+    level, fraction = np.float32(np.median(first.samples)), np.float32(1e-4)
+    signals = [
+        replace(one, samples=level + fraction * (one.samples - level) + faint[: len(one.samples)])
+        for one in slides[2].signals['signal']
+    ]
+    before = replace(slides[2].states[0], stamp_ns=first.stamp_ns, phase=Phase.APPROACH)
+    touch = replace(before, stamp_ns=first.stamp_ns + 800_000_000, phase=Phase.CONTACT)
+    weak = replace(slides[2], signals={'signal': signals}, states=[before, touch, *slides[2].sliding])
+    as_trained, sentence = check(model, weak)
+    assert not as_trained and 'the gain changed by -' in sentence
+    with pytest.raises(InvalidData, match=r'the slide over the plate has .* rms and the rest .*: too little signal'):
+        check(model, weak, correct=True)
+    with pytest.raises(InvalidData, match='too little signal'):
+        store_reference(model, TOPICS, [weak, weak])
+
+
 def test_the_reference_tells_how_its_slide_was_made(trained):
     model, slides = trained
     request = ExplorationRequest(

@@ -12,7 +12,7 @@ import numpy as np
 
 from texture_core.config import write_json
 from texture_core.errors import InvalidData
-from texture_core.types import ExplorationRequest
+from texture_core.types import NANOSECONDS, ExplorationRequest
 from texture_estimation.model import load_model, model_stem
 from texture_estimation.training import DAY_SUFFIX, adapted
 from texture_evaluation.train import training_examples
@@ -32,13 +32,19 @@ from texture_features.windows import WindowBatch
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.slides import LabelledSlide, SlideSamples
 
+# An arm without a new command for longer stops and sets off with a jerk, which no finger would show otherwise.
+PAUSE_S = 0.1
 UNMEASURED = 'noise and drift were not measured, as too little was recorded before the touch'
 
 
 def statistics_of(
-    slide: LabelledSlide, topics: Iterable[str], correction: Correction | None = None
+    slide: LabelledSlide, topics: Iterable[str], correction: Correction | None = None, *, weak: bool = False
 ) -> dict[str, InputStatistics]:
-    """Return what a slide over the reference plate shows of each input, as the correction of a model leaves it."""
+    """Return what a slide over the reference plate shows of each input, as the correction of a model leaves it.
+
+    A `weak` one may be hardly above the rest: that is a finding, but no reference, and nothing is corrected by it.
+    """
+    _check_steady(slide)
     found = {}
     for topic in topics:
         batches = slide.signals.get(topic, ())
@@ -52,8 +58,20 @@ def statistics_of(
         if correction is not None:
             samples = correction.apply(topic, WindowBatch(samples, one.rate_hz)).samples
             rest = correction.apply(topic, WindowBatch(rest, one.rate_hz)).samples if len(rest) else rest
-        found[topic] = InputStatistics.of(samples, rest, one.rate_hz, one.channels, batches[0].sensor)
+        found[topic] = InputStatistics.of(samples, rest, one.rate_hz, one.channels, batches[0].sensor, weak=weak)
     return found
+
+
+def _check_steady(slide: LabelledSlide) -> None:
+    """Raise InvalidData if the finger paused in the slide: late states, or several at one place."""
+    moves = (one for last, one in pairwise(slide.sliding) if (one.x_m, one.y_m) != (last.x_m, last.y_m))
+    stamps = [one.stamp_ns for one in (*slide.sliding[:1], *moves)]
+    pause_s = float(np.diff(stamps).max(initial=0)) / NANOSECONDS
+    if pause_s > PAUSE_S:
+        raise InvalidData(
+            f'the arm paused for {1e3 * pause_s:.0f} ms in the slide over the plate ({1e3 * PAUSE_S:.0f} ms are '
+            'allowed), so it shows nothing about the finger; stop other programs on the computer, and repeat'
+        )
 
 
 def store_reference(
@@ -89,7 +107,7 @@ def check_finger(
 
     It is compared as the nodes see it: through the correction of the model, if there is one.
     """
-    today = statistics_of(slide, topics)
+    today = statistics_of(slide, topics, weak=not correct)
     if missing := sorted(set(today) - set(reference)):
         raise InvalidData(f"the reference holds no '{missing[0]}'; store it again by --store")
     found = {topic: compare(reference[topic], one) for topic, one in today.items()}
@@ -97,7 +115,7 @@ def check_finger(
     path, correction = file_next_to(model, CORRECTION), read_correction(model)
     # Without the option the nodes keep the correction, so what it leaves is what counts.
     if correction is not None and not correct:
-        seen = statistics_of(slide, topics, correction)
+        seen = statistics_of(slide, topics, correction, weak=True)
         left = {topic: compare(reference[topic], one) for topic, one in seen.items()}
         if not _faults(left):
             return True, f"with its correction, '{path}', {_claim(left)}"
@@ -125,8 +143,11 @@ def adapt_to_today(model: str | Path, bags: Sequence[str | Path], today: Sequenc
     feature_set, out = trained.recipe.feature_set, f'{model_stem(model)}{DAY_SUFFIX}'
     shots = SlideDataset.from_bags(today, topics=feature_set.topics)
     examples = training_examples(trained.recipe, SlideDataset.from_bags(bags, topics=feature_set.topics))
-    adapted(trained, examples, shots.features(feature_set)).save(out)
-    return f"'{out}' is adapted to {len(shots)} slides of today; it names surfaces and rejects them all"
+    today_model = adapted(trained, examples, shots.features(feature_set))
+    today_model.save(out)
+    return (
+        f"'{out}' is adapted to {len(shots)} slides of today; it rejects every label: {today_model.acceptance.reason}"
+    )
 
 
 def _faults(found: Mapping[str, InputComparison]) -> list[str]:

@@ -44,21 +44,26 @@ class InputStatistics:
     rest_level: Array
 
     @classmethod
-    def of(cls, samples: Array, rest: Array, rate_hz: float, channels: Sequence[str], sensor: str) -> InputStatistics:
-        """Measure them on samples while sliding, (n, n_channels), and at rest, (m, n_channels) or empty."""
+    def of(
+        cls, samples: Array, rest: Array, rate_hz: float, channels: Sequence[str], sensor: str, *, weak: bool = False
+    ) -> InputStatistics:
+        """Measure them on samples while sliding, (n, n_channels), and at rest, (m, n_channels) or empty.
+
+        Only a `weak` slide may be hardly above the rest.
+        """
         length = round(SEGMENT_S * rate_hz)
         if len(samples) < MIN_SEGMENTS * length:
             raise InvalidData(
-                f'the reference slide lasts {len(samples) / rate_hz:.2f} s; slide for {MIN_SEGMENTS * SEGMENT_S:g} s '
-                'or longer'
+                f'the slide over the plate lasts {len(samples) / rate_hz:.2f} s; slide for '
+                f'{MIN_SEGMENTS * SEGMENT_S:g} s or longer'
             )
         for column in samples.T:
             values, counts = np.unique(column, return_counts=True)
             fraction = max(counts[0], counts[-1]) / len(column)
             if len(values) >= DISTINCT and fraction > SATURATED_FRACTION:
                 raise InvalidData(
-                    f'{100 * fraction:.0f} % of the samples of the reference slide are at the end of the range: the '
-                    'sensor is saturated; press less, or lower its gain'
+                    f'{100 * fraction:.0f} % of the samples of the slide over the plate are at the end of the range: '
+                    'the sensor is saturated; press less, or lower its gain'
                 )
         rms = samples.std(axis=0)
         quiet = np.full(samples.shape[1], math.nan)
@@ -67,10 +72,11 @@ class InputStatistics:
             # Of the typical stretch: the arm may set off, or the level settle, in some.
             stretches = rest[: len(rest) // length * length].reshape(-1, length, rest.shape[1])
             rest_rms, rest_level = np.median(stretches.std(axis=1), axis=0), np.median(rest, axis=0)
-        if float(np.median(rms)) < SIGNAL_TO_REST * float(np.median(rest_rms)):
+        if not weak and float(np.median(rms)) < SIGNAL_TO_REST * float(np.median(rest_rms)):
             raise InvalidData(
-                f'the reference slide has {np.median(rms):.3g} rms and the rest before it {np.median(rest_rms):.3g}: '
-                'too little signal; see that the finger touches the plate, or slide faster or harder'
+                f'the slide over the plate has {np.median(rms):.3g} rms and the rest before it '
+                f'{np.median(rest_rms):.3g}: too little signal; see that the finger touches the plate, or slide faster '
+                'or harder'
             )
         starts = np.arange(0, len(samples) - length + 1, length // 2)
         segments = np.stack([samples[start : start + length] for start in starts])

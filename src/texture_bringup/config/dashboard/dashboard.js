@@ -6,26 +6,35 @@ const RETRY_MS = 1000;
 const SILENT_MS = 3000;
 const FRAME_MS = 100;
 const BARS = 6;
+const NARROW = 500;
 const CURVES = ['--accent', '--second', '--third'];
 const AXIS = { left: 48, bottom: 18, top: 14 };
 const MAX_FRAMES = 300; // of one exploration; a longer one is thinned to every second frame, again and again
 const ENDED = ['idle', 'done', 'aborted'];
-const PRESSES = 'the arm may continue to press: look at the robot'; // an explorer that was killed does not lift
+// An explorer that was killed does not lift.
+const LOST = 'no data from the dashboard: the nodes may have ended, and the arm may continue to press: look at the robot';
 const at = (id) => document.getElementById(id);
 let replaying = null;
 const kept = new Map(); // what was shown of each exploration that is listed: texts, every how many, how many came
 let last = 0;
-let connected = false;
+let live = false;
+let answer = ['', false]; // to the last button, and whether it is bad
+let warning = ''; // of the nodes
 let phase = '';
 let stopping = false; // until the idle state says whether the finger was lifted
 let newest = ''; // id of the last exploration
 let curve = { id: '', points: [] };
 
 const shown = (value, digits, unit) => (value === null || value === undefined ? '–' : `${value.toFixed(digits)} ${unit}`);
-const say = (text, bad = false) => {
+const showBanner = () => {
+  const text = (live ? [answer[0], answer[0].includes(warning) ? '' : warning] : [LOST, answer[1] && answer[0]]).filter(Boolean).join(' · ');
   at('banner').textContent = text;
-  at('banner').className = bad ? 'banner bad' : 'banner';
+  at('banner').className = !live || answer[1] || warning ? 'banner bad' : 'banner';
   at('banner').hidden = !text;
+};
+const say = (text, bad = false) => {
+  answer = [text, bad];
+  showBanner();
 };
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name);
 const element = (kind, text, className = '') => {
@@ -87,6 +96,7 @@ function drawAxes({ pen, width, height }, { x, y, xTicks, yTicks, xUnit, yUnit }
   });
   pen.textBaseline = 'alphabetic';
   xTicks.forEach((value, k) => {
+    if (k === xTicks.length - 2 && width < NARROW) return; // no room next to the unit
     pen.textAlign = k === xTicks.length - 1 ? 'right' : 'center';
     pen.fillText(`${Number(value.toPrecision(3))}${k === xTicks.length - 1 ? ` ${xUnit}` : ''}`, x(value), height - 3);
   });
@@ -193,7 +203,8 @@ function drawCurve() {
   const x = (seconds) => AXIS.left + (seconds / longest) * (width - AXIS.left - 4);
   const y = (probability) => base - probability * (base - AXIS.top);
   drawAxes(plot, { x, y, xTicks: ticks(0, longest), yTicks: [0, 0.25, 0.5, 0.75, 1], xUnit: 's', yUnit: '' });
-  if (!points.length) return;
+  if (points.length < 2 && ENDED.includes(phase)) pen.fillText('shown for slides while the page is open', AXIS.left + 8, y(0.5));
+  if (points.length < 2) return;
   const last = points[points.length - 1].probabilities;
   const leading = Object.keys(last).sort((one, other) => last[other] - last[one]).slice(0, CURVES.length);
   leading.forEach((label, k) => {
@@ -258,6 +269,8 @@ function showFrame(frame) {
 
 function showRest(frame) {
   phase = frame.state.phase;
+  warning = frame.warning;
+  showBanner();
   if (stopping && phase === 'idle') {
     stopping = false;
     say(frame.state.lifted ? 'stopped; the finger is lifted' : 'stopped; the finger was not lifted: look at the robot', !frame.state.lifted);
@@ -315,13 +328,13 @@ function replay(id) {
 
 async function ask(name, body) {
   const moving = phase && !ENDED.includes(phase);
-  stopping = false;
+  if (name !== 'stop') stopping = false;
   try {
     const answer = await fetch(`api/${name}`, {
       method: 'POST', headers: { 'Content-Type': 'application/json' }, body: JSON.stringify(body),
     });
     const reply = await answer.json();
-    stopping = name === 'stop' && moving && reply.success;
+    if (name === 'stop') stopping = moving && reply.success;
     say(reply.message, !reply.success);
   } catch (error) {
     say(`'${name}' got no answer: ${error.message}`, true);
@@ -334,13 +347,13 @@ async function loadMotions() {
   const chosen = at('motion').value;
   at('motion').replaceChildren(...Object.keys(motions).map((name) => element('option', name)));
   at('motion').value = chosen in motions ? chosen : Object.keys(motions)[0];
-  const offer = () => at('numbers').replaceChildren(...motions[at('motion').value].map(numberField));
+  const offer = () => fill(at('numbers'), motions[at('motion').value], numberField); // typed ones stay
   at('motion').onchange = offer;
   offer();
 }
 
 function numberField(number) {
-  const label = element('label', `${number.name.split('_')[0]}${number.unit && number.unit !== number.name ? ` (${number.unit})` : ''}, ${number.low} to ${number.high}`);
+  const label = element('label', `${number.name.split('_')[0]}${number.unit && number.unit !== number.name ? ` (${number.unit})` : ''}, ${number.low} to ${number.high}${number.unit === 'm' ? ' within the workspace' : ''}`);
   const input = document.createElement('input');
   Object.assign(input, { type: 'number', step: 'any', min: number.low, max: number.high, value: number.default, required: true, name: number.name });
   label.append(input);
@@ -350,25 +363,29 @@ function numberField(number) {
 function connect() {
   const socket = new WebSocket(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws`);
   socket.onopen = () => {
-    connected = true;
-    last = Date.now();
-    say('');
     loadMotions().catch(() => say('the list of motions did not arrive; reload the page', true));
   };
   socket.onmessage = (message) => {
     const frame = JSON.parse(message.data);
     last = Date.now();
+    live = true;
     keep(frame.state, message.data);
     if (replaying === null) showFrame(frame);
     showRest(frame);
   };
   socket.onclose = () => {
-    connected = false;
-    at('phase').textContent = 'not connected';
-    say(`not connected: the nodes may have ended; ${PRESSES}`, true);
-    at('phase').className = 'phase aborted';
+    showLost();
     window.setTimeout(connect, RETRY_MS);
   };
+}
+
+// What was shown last is no longer known: no number, and no green node.
+function showLost() {
+  live = false;
+  showBanner();
+  showState({ phase: 'not connected' });
+  at('phase').className = 'phase aborted';
+  fill(at('lights'), [], element);
 }
 
 at('explore').addEventListener('submit', (event) => {
@@ -395,6 +412,6 @@ at('collect').addEventListener('submit', (event) => {
 document.querySelectorAll('[data-ask]').forEach((button) => button.addEventListener('click', () => ask(button.dataset.ask, {})));
 at('record').addEventListener('click', () => ask('record', { on: !at('record').dataset.on }));
 window.setInterval(() => {
-  if (!connected || Date.now() - last > SILENT_MS) say(`no data from the dashboard; is it still running? ${PRESSES}`, true);
+  if (Date.now() - last > SILENT_MS) showLost();
 }, SILENT_MS);
 connect();

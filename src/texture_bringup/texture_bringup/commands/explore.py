@@ -283,6 +283,7 @@ def _identify(options: argparse.Namespace) -> int:
 # Collect slides of a surface.
 
 RECIPE = 'default'  # whose features distinguish the places
+GAPS = 'windows with a gap are left out of features and training; if many are, reduce the load of the computer'
 WRITTEN_S = 60.0  # within which a slide is on the disk: the recorder may be behind
 RECORDED = ('signal', 'exploration')
 RECORDER_S = 60.0  # to start, on a busy machine
@@ -342,7 +343,7 @@ def collect_surface(
     except LaunchFailed:  # the recorder was not discovered
         _remove(bag)
         raise
-    end = replace(end, message=f'{end.message}; {losses}' if losses else end.message, slides=made)
+    end = replace(end, message=f'{end.message}; {losses}; {GAPS}' if losses else end.message, slides=made)
     # Where the recorder has ended, the bag there may be another one.
     if made or end.error is CollectionError.NOT_RECORDED:
         return end, bag
@@ -553,12 +554,16 @@ def _check(options: argparse.Namespace) -> int:
 
 
 def plate_request(options: argparse.Namespace, stored: Mapping[str, float]) -> ExplorationRequest:
-    """Return the slide over the plate: an option goes before what is stored with the reference."""
+    """Return the slide over the plate, which is that of the reference: another one shows nothing about the finger."""
     numbers: dict[str, Any] = {}
-    for option, (field, _, _, usual) in PLATE_NUMBERS.items():
-        given = getattr(options, option)
-        in_rad = math.radians if option == 'direction' else float
-        numbers[field] = stored.get(field, usual) if given is None else in_rad(given)
+    for option, (field, unit, _, usual) in PLATE_NUMBERS.items():
+        given, in_si = getattr(options, option), math.radians(1.0) if option == 'direction' else 1.0
+        numbers[field] = stored.get(field, usual) if given is None else given * in_si
+        if not math.isclose(numbers[field], made := stored.get(field, numbers[field])):
+            raise InvalidParameter(
+                f'--{option} is {given:g} {unit}, and the reference was made with {made / in_si:g} {unit}; leave it '
+                'out, or store a reference with it by --store'
+            )
     return ExplorationRequest('linear_slide', surface=PLATE, **numbers)
 
 

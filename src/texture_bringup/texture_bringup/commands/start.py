@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import argparse
+import fcntl
 import os
 import signal
 import sys
@@ -24,6 +25,7 @@ from texture_bringup.launcher import (
     read,
 )
 from texture_core.cli import Command, add_namespace, add_parameters, add_seed, parameters_from, task
+from texture_core.errors import LaunchFailed
 
 # Each command imports what it starts when it runs: a launcher is a child of many programs, and is up sooner without.
 # ruff: noqa: PLC0415
@@ -67,12 +69,14 @@ def refuse_wrong(nodes: Sequence[NodeDescription], given: set[str]) -> None:
     In a separate process: a launcher that stays needs none of their libraries.
     """
     wanted: list[tuple[str, ...]] = []
+    folders = set()
     for node in nodes:
         module, load, *names = LOOKED_AT.get(node.executable, ('', ''))
         known = {name: value for one in node.parameters if isinstance(one, Mapping) for name, value in one.items()}
         values = [str(known.get(name, '')) for name in names]
         if node.executable == 'emulator' and 'finger_pipe' in known:  # one uses it; else a recorder has made its bag
             wanted.append(('texture_core.types', 'FingerReceiver', str(known['finger_pipe'])))
+            folders.add(Path(str(known['finger_pipe'])).expanduser().parent)
         if all(values) and given.intersection(values):
             wanted.append((module, load, *values))
     if wanted:
@@ -81,6 +85,18 @@ def refuse_wrong(nodes: Sequence[NodeDescription], given: set[str]) -> None:
             with task('checking the files that the launch names'):  # behind the fork, which copies no thread
                 for check in checks:
                     check.result()
+    for folder in folders:
+        claim(folder)
+
+
+def claim(folder: Path) -> None:
+    """Hold the folder of emulated devices until this process ends: the sensor of a second launch would read them."""
+    try:
+        fcntl.flock(os.open(folder, os.O_RDONLY), fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        raise LaunchFailed(
+            f"another launch has the emulated devices in '{folder}'; end it, or give this one a namespace"
+        ) from error
 
 
 def _say(line: str) -> None:

@@ -87,6 +87,7 @@ class DashboardNode(Node):
         if 'motion' not in asked:
             raise InvalidParameter('no motion is requested; give its name as `motion`')
         request = from_mapping(ExplorationRequest, {name: _short(value) for name, value in asked.items()})
+        self._check_free()
 
         def explore(operator: Operator) -> Mapping[str, Any]:
             operator.wait_for_explorer(EXPLORER_S)
@@ -204,8 +205,7 @@ class DashboardNode(Node):
 
     async def _run(self, stopped: Callable[[], bool], name: str, *arguments: str) -> Mapping[str, Any]:
         """Run a sub-command of `texture`, one at a time; the page shows each line of it, the last at its end."""
-        if self._feed.working:
-            raise InvalidParameter(f'the page already runs: {self._feed.working}; wait for it, or press Stop')
+        self._check_free()
         self._feed.working = f'{name}: starting'
         command = [sys.executable, '-m', 'texture_bringup.command', name, *arguments]
         namespace = self.get_namespace().strip('/')
@@ -238,6 +238,11 @@ class DashboardNode(Node):
                 return work(operator)
 
         return await asyncio.get_running_loop().run_in_executor(None, operate)
+
+    def _check_free(self) -> None:
+        """Refuse what moves the arm while the page runs a sub-command that does."""
+        if self._feed.working:
+            raise InvalidParameter(f'the page already runs: {self._feed.working}; wait for it, or press Stop')
 
     def _check_open(self) -> None:
         if self._closing:
