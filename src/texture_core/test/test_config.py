@@ -157,6 +157,10 @@ BAD = {
     'no text': b'\xff\xd8\xff',
     'an alias': b'a: &a [1]\nb: *a',
     'itself': b'&a [*a]',
+    'a key twice': b'a: {value: 1}\nb: 2\na: {value: 1}',
+    'a key twice in a line': b'a: {0: cork, 1: felt, 0: glass}',
+    'a number and a text as one key': b"{1: cork, '1': felt}",
+    'a number twice': b'{8: cork, 010: felt}',
 }
 
 
@@ -166,6 +170,12 @@ def test_bad_yaml_is_refused_with_one_line_and_soon(what: str, tmp_path: Path) -
     with pytest.raises(InvalidParameter, match=r"scene '.*' is not YAML that can be read: ") as caught:
         load_yaml(tmp_path / 'file.yaml', 'scene')
     assert '\n' not in str(caught.value)
+
+
+def test_a_key_that_is_there_twice_is_named_with_its_lines(tmp_path: Path) -> None:
+    (tmp_path / 'file.yaml').write_text('label: {value: cork}\nfiles: a\nlabel: {column: b}\n')
+    with pytest.raises(InvalidParameter, match="line 3 has the key 'label', as line 1 has; write each key once"):
+        load_yaml(tmp_path / 'file.yaml', 'mapping')
 
 
 @pytest.mark.parametrize('text', ['[' * 100_000, '{"recipe"', '[]', '3', '"x"', '\x00'])

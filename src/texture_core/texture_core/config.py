@@ -411,7 +411,7 @@ def load_card(path: Path) -> Any:
 
 
 class _PlainLoader(yaml.SafeLoader):
-    """Reads no aliases, with which 400 bytes may stand for a billion values."""
+    """Reads no aliases, with which 400 bytes may stand for a billion values, and no key twice: the last would count."""
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         if self.check_event(yaml.AliasEvent):
@@ -420,6 +420,15 @@ class _PlainLoader(yaml.SafeLoader):
                 f"line {event.start_mark.line + 1} has the alias '*{event.anchor}'; write there what it stands for"
             )
         return super().compose_node(parent, index)
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        lines: dict[str, int] = {}
+        for key, _ in node.value:
+            name, line = str(self.construct_object(key, deep=True)), key.start_mark.line + 1  # 1 and '1' are one name
+            if name in lines:
+                raise ValueError(f"line {line} has the key '{name}', as line {lines[name]} has; write each key once")
+            lines[name] = line
+        return super().construct_mapping(node, deep=deep)
 
 
 def parse_yaml(text: str) -> Any:
