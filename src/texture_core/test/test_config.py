@@ -174,7 +174,7 @@ def test_bad_yaml_is_refused_with_one_line_and_soon(what: str, tmp_path: Path) -
 
 def test_a_key_that_is_there_twice_is_named_with_its_lines(tmp_path: Path) -> None:
     (tmp_path / 'file.yaml').write_text('label: {value: cork}\nfiles: a\nlabel: {column: b}\n')
-    with pytest.raises(InvalidParameter, match="line 3 has the key 'label', as line 1 has; write each key once"):
+    with pytest.raises(InvalidParameter, match="the key 'label' is in line 1 and again in line 3; write it once"):
         load_yaml(tmp_path / 'file.yaml', 'mapping')
 
 

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 # Look a choice up by name: in a table of the suite, or as 'module:Class' of the user.
 
 T = TypeVar('T')
+MOST_NAMES = 100  # that a sentence lists
 
 
 def find(catalogue: Mapping[str, T], name: str, kind: str) -> T:
@@ -77,7 +78,8 @@ def unknown_name(name: str, known: Iterable[str], kind: str) -> UnknownName:
     names = sorted(known)
     near = difflib.get_close_matches(name, names, n=1)
     hint = f"; did you mean '{near[0]}'?" if near else '.'
-    return UnknownName(f"no {kind} '{name}'{hint} Known: {', '.join(names) or 'none'}")
+    more = f', … ({len(names)})' if len(names) > MOST_NAMES else ''
+    return UnknownName(f"no {kind} '{name}'{hint} Known: {', '.join(names[:MOST_NAMES]) or 'none'}{more}")
 
 
 def _import(name: str, kind: str) -> Any:
@@ -426,7 +428,7 @@ class _PlainLoader(yaml.SafeLoader):
         for key, _ in node.value:
             name, line = str(self.construct_object(key, deep=True)), key.start_mark.line + 1  # 1 and '1' are one name
             if name in lines:
-                raise ValueError(f"line {line} has the key '{name}', as line {lines[name]} has; write each key once")
+                raise ValueError(f"the key '{name}' is in line {lines[name]} and again in line {line}; write it once")
             lines[name] = line
         return super().construct_mapping(node, deep=deep)
 
