@@ -162,5 +162,7 @@ def test_a_pattern_that_takes_the_number_of_a_file_for_a_label_is_named(tmp_path
         "{files: '{material}_{run:d}.csv', label: {column: material}, slides: {by: file}, "
         'streams: {signal: {columns: [acc], rate_hz: 1000, unit: g}}}'
     )
-    assert main(['import', 'table', str(tmp_path / 'map.yaml'), str(tmp_path), '--dry-run']) == 0
+    words = ['import', 'table', str(tmp_path / 'map.yaml'), str(tmp_path)]
+    assert 'among the files that are read; name a folder elsewhere' in refused([*words, str(tmp_path / 'out')], capsys)
+    assert main([*words, '--dry-run']) == 0
     assert 'surfaces that differ by a number alone: cork_2025, cork_2026' in capsys.readouterr().out

@@ -44,6 +44,11 @@ def test_an_unknown_name_is_answered_with_the_nearest() -> None:
         find({'hjorth': 1, 'level': 2}, 'hjort', 'feature')
 
 
+def test_of_many_names_the_first_are_listed() -> None:
+    with pytest.raises(UnknownName, match=r"no column 'trial'. Known: X0000, X0001, .*, X0099, … \(1500\)$"):
+        find({f'X{number:04d}': 1 for number in range(1500)}, 'trial', 'column')
+
+
 def test_a_users_class_is_imported() -> None:
     assert find({}, 'numpy:sqrt', 'feature') is np.sqrt
 

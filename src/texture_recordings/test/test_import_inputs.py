@@ -140,7 +140,7 @@ CLOCKS: dict[str, tuple[Write, dict, Truth]] = {
     'us that are called ms': (csv(1e6 * T, X), timed('ms'), 'rate of .* with unit: us'),
     'ms that are called s at 8 kHz': (
         csv((T / 80 * 1e3).round(6), X), {'conditions': {'speed': {'value': '0.5'}}},
-        'row 2: a slide lasts 75 s at 0.5 m/s: 37.5 m, at most 10 m are .* which may be ms',
+        'row 2: a slide lasts 75 s at 0.5 m/s, so it has 37.5 m; at most .* 10 m are .* its unit, which may be ms$',
     ),
     'a speed of 0': (csv(T, X), {'conditions': {'speed': {'value': '0'}}}, 'speed of a slide is 0 m/s, plausible are'),
     'a force of 0': (csv(T, X), {'conditions': {'force': {'value': '0'}}}, 'is 0 N, .*; leave out what is unknown'),
@@ -497,10 +497,10 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
     **{
         f'a file of {name}': (binary(content), {}, sentence)
         for name, content, sentence in (
-            ('gzip', gzip.compress(b't,x'), "'cork_1.csv' is compressed by gzip; unpack it"),
-            ('Excel', b'PK\x03\x04' + bytes(99), 'is a ZIP file, such as a workbook of Excel; save its sheet as CSV'),
-            ('old Excel', b'\xd0\xcf\x11\xe0' + bytes(99), 'is a workbook of Excel; save its sheet as CSV'),
-            ('UTF-16', 't,x\n1,2\n'.encode('utf-16'), 'is a text in UTF-16; save it in UTF-8'),
+            ('gzip', gzip.compress(b't,x'), "'cork_1.csv' is a file of gzip, whatever its name; unpack it"),
+            ('Excel', b'PK\x03\x04' + bytes(99), 'is a file of ZIP or Excel, .*, or save it as CSV in UTF-8'),
+            ('old Excel', b'\xd0\xcf\x11\xe0' + bytes(99), 'is a file of Excel,'),
+            ('UTF-16', 't,x\n1,2\n'.encode('utf-16'), 'is a file of UTF-16, .* in UTF-8'),
             ('CR', b't,x\r1,2\r3,4\r', 'ends lines with CR alone'),
         )
     },
@@ -704,7 +704,8 @@ CONTAINERS: dict[str, tuple[Write, dict, Truth]] = {
     ),
     'objects': (npz(x=X.astype(object)), {**ANY, **RATE}, 'Object arrays .*; save it again as arrays of numbers'),
     'an array on its side': (
-        npz(**{'1/a': np.c_[T, 0.06 + 0.01 * X, 0.05 + 0.01 * Y, 0.03 + 0.01 * Y].T}), {**ANY, **numbered('1-3'), 'tables': '{i}/a'},
+        npz(**{'1/a': np.c_[T, 0.06 + 0.01 * X, 0.05 + 0.01 * X, 0.1 + 0.01 * Y].T}),
+        {**ANY, **numbered('1-3'), 'tables': '{i}/a'},
         r"'0': time goes back .*; if the array lies on its side, write format: \{transpose: true\}",
     ),
     'sounds of two rates': (

@@ -129,10 +129,9 @@ def frames(path: Path, place: str, mapping: TableMapping) -> Iterator[TableFrame
                 size = sum(one.stat().st_size for one in path.iterdir() if one.is_file())
             else:
                 with open_regular(path, MAX_FILE_BYTES) as file:
-                    head, size = file.read(len(LFS)), file.seek(0, io.SEEK_END)
-                other = NO_TEXT_FILES if READERS[kind_of(path)] is _read_csv else {LFS: NO_DATA}
-                if found := [sentence for begin, sentence in other.items() if head.startswith(begin)]:
-                    raise InvalidData(f'it is {found[0]}')
+                    if file.read(len(LFS)) == LFS:
+                        raise InvalidData('it is a pointer of Git LFS and has no data; run: git lfs pull')
+                    size = file.seek(0, io.SEEK_END)
             taken, most = 0.0, max(MAX_VALUES, size)
 
             def take(count: float) -> None:
@@ -155,15 +154,8 @@ def frames(path: Path, place: str, mapping: TableMapping) -> Iterator[TableFrame
 
 # ---- text files
 
-LFS, NO_DATA = b'version https://git-lfs', 'a pointer of Git LFS and has no data; run: git lfs pull'
-# How files begin that are no texts, and what they are.
-NO_TEXT_FILES: Mapping[bytes, str] = {
-    LFS: NO_DATA,
-    b'\x1f\x8b': 'compressed by gzip; unpack it: gunzip FILE.csv.gz',
-    b'PK\x03\x04': 'a ZIP file, such as a workbook of Excel; save its sheet as CSV, or unpack it',
-    b'\xd0\xcf\x11\xe0': 'a workbook of Excel; save its sheet as CSV',
-    b'\xff\xfe': 'a text in UTF-16; save it in UTF-8',
-}
+# How files begin that are no texts.
+OTHER_FILES = {b'\x1f\x8b': 'gzip', b'PK\x03\x04': 'ZIP or Excel', b'\xd0\xcf\x11\xe0': 'Excel', b'\xff\xfe': 'UTF-16'}
 DELIMITERS = (',', ';', '\t', '|', ' ')
 BLOCK_ROWS = 20_000  # which are parsed at once
 NO_TEXT = frozenset(('nan', 'na', 'n/a', '#n/a', 'null'))  # 'none' may be a label
@@ -278,6 +270,8 @@ def _refuse_other_rows(names: Sequence[str], malformed: Mapping[int, Sequence[st
 
 def _opened(opened: Any, form: FileFormat) -> tuple[Iterator[tuple[int, str]], str, list[str]]:
     """Return the lines of rows, the delimiter, and the names of the columns by the first row."""
+    if found := [kind for begin, kind in OTHER_FILES.items() if opened.peek(4).startswith(begin)]:
+        raise InvalidData(f'it is a file of {found[0]}, whatever its name; unpack it, or save it as CSV in UTF-8')
     rest = _lines(opened, form)
     first = next(rest, (0, ''))
     if '\r' in first[1].rstrip('\r\n'):
@@ -415,6 +409,8 @@ def number_of(cell: str) -> float:
 
 
 # ---- files of arrays
+
+LFS = b'version https://git-lfs'
 
 
 def _read_numpy(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:

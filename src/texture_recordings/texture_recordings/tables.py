@@ -127,8 +127,8 @@ class ImportReport:
         if all(others):
             raise InvalidData(
                 f"the slides '{name}' and '{min(others[0])}' (file/number of the slide) have the same samples "
-                'in all or in a part; a copy is no further slide, nor is an overlapping window: remove one of them, its '
-                'row or its file'
+                'in all or in a part; a copy is no further slide, nor is an overlapping window: remove one of them, or '
+                'its row or file'
             )
 
     def refuse_like_labels(self, names: Mapping[str, str]) -> None:
@@ -621,26 +621,23 @@ class FrameSlides:
         if not surface:
             raise InvalidData('a slide has an empty label; name another column under `label`')
         session = self._value(self._mapping.session, rows, 'session') if self._mapping.session else surface
-        if end_s - begin_s > LONGEST_SLIDE_S:
-            raise InvalidData(
-                f'row {self._line(self._reference.rows[rows.start])}: a slide lasts {end_s - begin_s:.4g} s, at most '
-                f'{LONGEST_SLIDE_S:g} s are plausible; look at the column of time, its unit and `slides`'
-            )
-        streams = {one.name: self._samples(one, surface, rows, span_s) for one in self._streams}
-        self._report.with_nan += any(np.isnan(signal.samples).any() for signal, _ in streams.values())
         known: dict[str, Any] = {}
         for name, column in CONDITION_COLUMNS.items():
             mean = self._condition(name, rows)
             if math.isfinite(mean):
                 self._report.conditions[surface, name].append(self._plausible(name, mean))
                 known[column] = mean
-        if (track_m := known.get('speed_m_s', 0.0) * (end_s - begin_s)) > LONGEST_TRACK_M:
-            units = [one for one, by in _units(self._reference.params, self._reference.rate_hz) if track_m * by < 1.0]
+        lasts_s, speed_m_s = end_s - begin_s, known.get('speed_m_s', 0.0)
+        if lasts_s > LONGEST_SLIDE_S or lasts_s * speed_m_s > LONGEST_TRACK_M:
+            track = f' at {speed_m_s:.3g} m/s, so it has {lasts_s * speed_m_s:.3g} m' if speed_m_s else ''
+            units = [unit for unit, factor in _units(self._reference.params, self._reference.rate_hz) if factor < 1.0]
             raise InvalidData(
-                f'row {self._line(self._reference.rows[rows.start])}: a slide lasts {end_s - begin_s:.4g} s at '
-                f'{known["speed_m_s"]:.3g} m/s: {track_m:.3g} m, at most {LONGEST_TRACK_M:g} m are plausible; look at '
-                '`slides` and the units of speed and time' + (f', which may be {units[0]}' if units else '')
+                f'row {self._line(self._reference.rows[rows.start])}: a slide lasts {lasts_s:.4g} s{track}; at most '
+                f'{LONGEST_SLIDE_S:g} s and {LONGEST_TRACK_M:g} m are plausible; look at `slides`, the speed and the column '
+                f'of time with its unit{", which may be " * bool(units)}{"".join(units[:1])}'
             )
+        streams = {one.name: self._samples(one, surface, rows, span_s) for one in self._streams}
+        self._report.with_nan += any(np.isnan(signal.samples).any() for signal, _ in streams.values())
         self._report.slides[surface] += 1
         name, motion = f'{self._place}/{number}', self._mapping.motion
         state = ExplorationState(0, name, motion, Phase.SLIDE, surface=surface, **known)
