@@ -633,8 +633,8 @@ class FrameSlides:
             units = [unit for unit, factor in _units(self._reference.params, self._reference.rate_hz) if factor < 1.0]
             raise InvalidData(
                 f'row {self._line(self._reference.rows[rows.start])}: a slide lasts {lasts_s:.4g} s{track}; at most '
-                f'{LONGEST_SLIDE_S:g} s and {LONGEST_TRACK_M:g} m are plausible; look at `slides`, the speed and the column '
-                f'of time with its unit{", which may be " * bool(units)}{"".join(units[:1])}'
+                f'{LONGEST_SLIDE_S:g} s and {LONGEST_TRACK_M:g} m are plausible; look at `slides`, the speed and the '
+                f'column of time with its unit{", which may be " * bool(units)}{"".join(units[:1])}'
             )
         streams = {one.name: self._samples(one, surface, rows, span_s) for one in self._streams}
         self._report.with_nan += any(np.isnan(signal.samples).any() for signal, _ in streams.values())
