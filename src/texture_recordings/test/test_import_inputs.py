@@ -702,7 +702,7 @@ CONTAINERS: dict[str, tuple[Write, dict, Truth]] = {
     'records of arrays': (
         records, {**ANY, 'streams': {'signal': {'columns': ['d.acc.*'], 'rate_hz': 100.0}}}, [('cork', np.c_[X, Y])],
     ),
-    'objects': (npz(x=X.astype(object)), {**ANY, **RATE}, 'Object arrays .*; save it again as arrays of numbers'),
+    'objects': (npz(x=X.astype(object)), {**ANY, **RATE}, 'Object arrays .*; save its arrays as numbers$'),
     'an array on its side': (
         npz(**{'1/a': np.c_[T, 0.06 + 0.01 * X, 0.05 + 0.01 * X, 0.1 + 0.01 * Y].T}),
         {**ANY, **numbered('1-3'), 'tables': '{i}/a'},

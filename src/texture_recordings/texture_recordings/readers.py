@@ -148,8 +148,8 @@ def frames(path: Path, place: str, mapping: TableMapping) -> Iterator[TableFrame
             raise
         except Exception as error:  # whatever a library raises, which depends on the byte that is wrong
             reason = (str(error) or type(error).__name__)[:300]
-            numbers = ' as arrays of numbers' if 'Object arrays' in reason else ''
-            raise InvalidData(f'it cannot be read: {reason}; save it again{numbers}') from error
+            again = 'save its arrays as numbers' if 'Object arrays' in reason else 'save it again'
+            raise InvalidData(f'it cannot be read: {reason}; {again}') from error
 
 
 # ---- text files

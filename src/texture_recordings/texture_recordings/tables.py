@@ -138,8 +138,8 @@ class ImportReport:
             other = like.setdefault(_plain(label), label)
             if other != label and not {label, other} <= {*names.values()}:
                 # What looks the same is shown by its codes, as YAML reads them.
-                same_look = unicodedata.normalize('NFC', other) == unicodedata.normalize('NFC', label)
-                one, same = map(json.dumps if same_look else repr, (other, label))
+                alike = unicodedata.normalize('NFC', other) == unicodedata.normalize('NFC', label)
+                one, same = map(json.dumps if alike else repr, (other, label))
                 raise InvalidData(
                     f'the labels {one} and {same} differ only in case, blanks, signs, the coding of letters or digits '
                     f'behind the point; write both under `label`, such as names: {{{one}: {same}, {same}: {same}}}'
@@ -595,8 +595,6 @@ class FrameSlides:
 
     def _value(self, name: str, rows: slice, kind: str) -> str:
         """Return the one value that a column has during a slide."""
-        if not self._texts[name].ndim and self._texts[name][()]:
-            return str(self._texts[name])
         held = self._aligned(self._texts, name, rows)
         known = np.flatnonzero(held != '')
         if not len(known):
