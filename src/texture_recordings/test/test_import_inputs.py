@@ -198,6 +198,7 @@ def test_rows_of_a_buffer_have_the_rate_of_rows_and_duration(tmp_path: Path, siz
 
 SAME = r'.* have the same samples in all or in a part; a copy is no further slide, nor is an overlapping window'
 LONG = np.random.default_rng(0).normal(size=180_000).round(4)
+HUMS = np.rint(5 * np.sin(np.pi * np.arange(20_000) / 10) + np.random.default_rng(0).normal(0, 0.05, (2, 20_000)))
 HALVES: Truth = [('cork', X[:300]), ('felt', X[300:])]
 CODES = {'label': {'column': 'l', 'names': {0: 'cork', 1: 'felt'}}, 'slides': {'by': 'column', 'column': 'l'}}
 BOTH = {
@@ -217,7 +218,9 @@ def grouped(folder: Path) -> None:
 LABELS: dict[str, tuple[Write, dict, Truth]] = {
     'case': (both(csv(T, X, name='Cork_1.csv'), csv(T, Y, name='cork_2.csv')), {}, "labels 'Cork' and 'cork' differ"),
     'blanks': (both(csv(T, X, name='oak b_1.csv'), csv(T, Y, name='oak  b_2.csv')), {}, 'differ only in case, blanks'),
-    'composed letters': (both(csv(T, X, name='\xfc_1.csv'), csv(T, Y, name='u\u0308_2.csv')), {}, 'differ only in'),
+    'composed letters': (
+        both(csv(T, X, name='\xfc_1.csv'), csv(T, Y, name='u\u0308_2.csv')), {}, r'"u\\u0308" and "\\u00fc" differ only',
+    ),
     'codes 0.0 and 1.0': (coded(['0.0'] * 300 + ['1.0'] * 300), CODES, HALVES),
     'codes of savetxt': (coded(['0.000e+00'] * 300 + ['1.000e+00'] * 300), CODES, HALVES),
     'a code without a name': (coded(np.repeat([1, 2], 300)), CODES, 'the label 2 has no name; it is none of 0, 1'),
@@ -284,12 +287,15 @@ LABELS: dict[str, tuple[Write, dict, Truth]] = {
     **{
         f'no copy: {name}': (both(csv(T, one), csv(T, other, name='felt_7.csv')), {}, [('cork', one), ('felt', other)])
         for name, one, other in (
-            ('few levels', *np.random.default_rng(0).integers(0, 3, (2, N))),
             ('a period', np.tile(X[:50], 12), np.tile(X[:50], 12)[7:].repeat(2)[:N]),
             ('a period that begins later', np.tile(X[:100], 6), np.r_[Y[:3], np.tile(X[:100], 6)][:N]),
             ('few samples', X, np.r_[Y[:300], X[300:350], Y[350:]]),
         )
     },
+    'a hum of few levels, and again': (
+        npz(**{f'{number}/x': hum for number, hum in enumerate(HUMS)}), {**ANY, **RATE, 'tables': '{i}'},
+        [('cork', hum) for hum in HUMS],
+    ),
     'a run twice in a file': (
         csv(np.r_[T[:300], 9 + T[:300]], np.tile(X[:300], 2)), {'slides': {'by': 'pause'}},
         "slides 'cork_1.csv/2' and 'cork_1.csv/1'",
