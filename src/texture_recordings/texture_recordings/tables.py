@@ -68,7 +68,7 @@ ROWS_A_CODE = 2  # at least, of a column that may name sensors, trials or runs
 MANY_TEXTS = 50  # different ones are no codes
 RUN, MOST_KNOWN = 64, 32  # changes that two slides share at most, and of these such as came within the last 64
 PART = 100_000  # rows that are compared at once
-SHARED, MOST_HOPS = 16, 1000  # samples that windows share at least, and shifts at which they are compared
+SHARED, MOST_HOPS = 16, 1000  # different samples that windows share at least, and shifts at which they are compared
 FLAGS = {'true', 'false', 'yes', 'no', 'on', 'off'}
 CODE_NAME = re.compile(
     r'(?:sensor|finger|trial|run|rep|repeat|repetition|recording|session|pass|stroke)s?[ _-]?(?:id|no|nr|number)?'
@@ -790,7 +790,7 @@ def _goes_on(before: AnyArray, after: AnyArray) -> bool:
     """Return whether a slide begins with the last samples of the one before, as short windows do that overlap."""
     begins = np.flatnonzero((before[: 1 - SHARED] == after[0]).all(axis=1))[-MOST_HOPS:].tolist()
     ends = [before[at:] for at in begins if np.array_equal(before[at:], after[: len(before) - at])]
-    return any(len(np.unique(end, axis=0)) > SHARED // 2 for end in ends)
+    return any(len(np.unique(end, axis=0)) >= SHARED for end in ends)
 
 
 def _is_one_of(text: str, wanted: Sequence[str]) -> bool:
