@@ -166,10 +166,12 @@ def test_what_is_missing_or_mistyped_is_named(command, sentence, data, capsys, m
 
 def test_a_pattern_that_takes_the_number_of_a_file_for_a_label_is_named(tmp_path, capsys) -> None:
     for start, name in enumerate(('cork_2025_1', 'cork_2026_1')):
-        np.savetxt(tmp_path / f'{name}.csv', np.sin(start + np.arange(1000.0)), header='acc', comments='')
+        np.savetxt(tmp_path / f'{name}.csv', np.sin((1.0 + 0.1 * start) * np.arange(1000.0)), header='acc', comments='')
     (tmp_path / 'map.yaml').write_text(
         "{files: '{material}_{run:d}.csv', label: {column: material}, slides: {by: file}, "
         'streams: {signal: {columns: [acc], rate_hz: 1000, unit: g}}}'
     )
-    assert main(['import', 'table', str(tmp_path / 'map.yaml'), str(tmp_path), '--dry-run']) == 0
+    words = ['import', 'table', str(tmp_path / 'map.yaml'), str(tmp_path)]
+    assert 'among the files that are read; name a folder elsewhere' in refused([*words, str(tmp_path / 'out')], capsys)
+    assert main([*words, '--dry-run']) == 0
     assert 'surfaces that differ by a number alone: cork_2025, cork_2026' in capsys.readouterr().out

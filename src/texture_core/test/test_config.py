@@ -44,6 +44,11 @@ def test_an_unknown_name_is_answered_with_the_nearest() -> None:
         find({'hjorth': 1, 'level': 2}, 'hjort', 'feature')
 
 
+def test_of_many_names_the_first_are_listed() -> None:
+    with pytest.raises(UnknownName, match=r"no column 'trial'. Known: X0000, X0001, .*, X0099, … \(1500\)$"):
+        find({f'X{number:04d}': 1 for number in range(1500)}, 'trial', 'column')
+
+
 def test_a_users_class_is_imported() -> None:
     assert find({}, 'numpy:sqrt', 'feature') is np.sqrt
 
@@ -157,6 +162,10 @@ BAD = {
     'no text': b'\xff\xd8\xff',
     'an alias': b'a: &a [1]\nb: *a',
     'itself': b'&a [*a]',
+    'a key twice': b'a: {value: 1}\nb: 2\na: {value: 1}',
+    'a key twice in a line': b'a: {0: cork, 1: felt, 0: glass}',
+    'a number and a text as one key': b"{1: cork, '1': felt}",
+    'a number twice': b'{8: cork, 010: felt}',
 }
 
 
@@ -166,6 +175,12 @@ def test_bad_yaml_is_refused_with_one_line_and_soon(what: str, tmp_path: Path) -
     with pytest.raises(InvalidParameter, match=r"scene '.*' is not YAML that can be read: ") as caught:
         load_yaml(tmp_path / 'file.yaml', 'scene')
     assert '\n' not in str(caught.value)
+
+
+def test_a_key_that_is_there_twice_is_named_with_its_lines(tmp_path: Path) -> None:
+    (tmp_path / 'file.yaml').write_text('label: {value: cork}\nfiles: a\nlabel: {column: b}\n')
+    with pytest.raises(InvalidParameter, match="the key 'label' is in line 1 and again in line 3; write it once"):
+        load_yaml(tmp_path / 'file.yaml', 'mapping')
 
 
 @pytest.mark.parametrize('text', ['[' * 100_000, '{"recipe"', '[]', '3', '"x"', '\x00'])

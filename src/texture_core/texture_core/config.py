@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 # Look a choice up by name: in a table of the suite, or as 'module:Class' of the user.
 
 T = TypeVar('T')
+MOST_NAMES = 100  # that a sentence lists
 
 
 def find(catalogue: Mapping[str, T], name: str, kind: str) -> T:
@@ -78,7 +79,8 @@ def unknown_name(name: str, known: Iterable[str], kind: str) -> UnknownName:
     names = sorted(known)
     near = difflib.get_close_matches(name, names, n=1)
     hint = f"; did you mean '{near[0]}'?" if near else '.'
-    return UnknownName(f"no {kind} '{name}'{hint} Known: {', '.join(names) or 'none'}")
+    more = f', … ({len(names)})' if len(names) > MOST_NAMES else ''
+    return UnknownName(f"no {kind} '{name}'{hint} Known: {', '.join(names[:MOST_NAMES]) or 'none'}{more}")
 
 
 def _import(name: str, kind: str) -> Any:
@@ -430,7 +432,7 @@ def load_card(path: Path) -> Any:
 
 
 class _PlainLoader(yaml.SafeLoader):
-    """Reads no aliases, with which 400 bytes may stand for a billion values."""
+    """Reads no aliases, with which 400 bytes may stand for a billion values, and no key twice: the last would count."""
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         if self.check_event(yaml.AliasEvent):
@@ -439,6 +441,15 @@ class _PlainLoader(yaml.SafeLoader):
                 f"line {event.start_mark.line + 1} has the alias '*{event.anchor}'; write there what it stands for"
             )
         return super().compose_node(parent, index)
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        lines: dict[str, int] = {}
+        for key, _ in node.value:
+            name, line = str(self.construct_object(key, deep=True)), key.start_mark.line + 1  # 1 and '1' are one name
+            if name in lines:
+                raise ValueError(f"the key '{name}' is in line {lines[name]} and again in line {line}; write it once")
+            lines[name] = line
+        return super().construct_mapping(node, deep=deep)
 
 
 def parse_yaml(text: str) -> Any:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Inputs that somebody could have, one table for each kind: the true samples, or a refusal that says what is wrong."""
 
+import gzip
 import io
 import sqlite3
 import struct
@@ -18,6 +19,7 @@ import pytest
 import scipy.io
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_types_from_msg
+from scipy.io import wavfile
 
 from texture_core.errors import InvalidData
 from texture_recordings.bags import CheckedPath, message_types
@@ -67,6 +69,10 @@ def csv(*columns: Any, names: str = 't,x', name: str = 'cork_1.csv') -> Write:
 
 def text(content: str, name: str = 'cork_1.csv') -> Write:
     return lambda folder: (folder / name).write_text(content)
+
+
+def binary(content: bytes) -> Write:
+    return lambda folder: (folder / 'cork_1.csv').write_bytes(content)
 
 
 def npz(**arrays: Any) -> Write:
@@ -132,6 +138,18 @@ CLOCKS: dict[str, tuple[Write, dict, Truth]] = {
     'a pause': (csv(np.r_[T[:100], 3 + T[:500]], X), PAUSE, [('cork', X[:100]), ('cork', X[100:])]),
     'ms that are called s': (csv(1e3 * T, X), {}, r'0\.1 Hz by its times; with unit: ms it were 100 Hz'),
     'us that are called ms': (csv(1e6 * T, X), timed('ms'), 'rate of .* with unit: us'),
+    'ms that are called s at 8 kHz': (
+        csv((T / 80 * 1e3).round(6), X), {'conditions': {'speed': {'value': '0.5'}}},
+        'row 2: a slide lasts 75 s at 0.5 m/s, so it has 37.5 m; at most .* 10 m are .* its unit, which may be ms$',
+    ),
+    'a speed of 0': (csv(T, X), {'conditions': {'speed': {'value': '0'}}}, 'speed of a slide is 0 m/s, plausible are'),
+    'a force of 0': (csv(T, X), {'conditions': {'force': {'value': '0'}}}, 'is 0 N, .*; leave out what is unknown'),
+    **{
+        f'a force of {force} N in a column': (
+            csv(T, X, np.tile(force, N // 2), names='t,x,f'), {'conditions': {'force': {'column': 'f'}}}, 'is 0 N, pl',
+        )
+        for force in ((0.0, 0.0), (1.2, -1.2))
+    },
     'a speed in cm/s': (csv(T, X), {'conditions': {'speed': {'value': '20'}}}, 'speed .* 20 m/s.* may be cm/s or mm/s'),
     'a speed in m/s': (
         csv(T, X), {'conditions': {'speed': {'value': '0.03', 'unit': 'mm/s'}}}, r'0\.03 mm/s.* may be m/s or cm/s',
@@ -178,6 +196,9 @@ def test_rows_of_a_buffer_have_the_rate_of_rows_and_duration(tmp_path: Path, siz
     assert slide.signals['signal'][0].sampling_rate_hz == pytest.approx(100.0, rel=0.01)
 
 
+SAME = r'.* have the same samples in all or in a part; a copy is no further slide, nor is an overlapping window'
+LONG = np.random.default_rng(0).normal(size=180_000).round(4)
+HUMS = np.rint(5 * np.sin(np.pi * np.arange(20_000) / 10) + np.random.default_rng(0).normal(0, 0.05, (2, 20_000)))
 HALVES: Truth = [('cork', X[:300]), ('felt', X[300:])]
 CODES = {'label': {'column': 'l', 'names': {0: 'cork', 1: 'felt'}}, 'slides': {'by': 'column', 'column': 'l'}}
 BOTH = {
@@ -197,7 +218,9 @@ def grouped(folder: Path) -> None:
 LABELS: dict[str, tuple[Write, dict, Truth]] = {
     'case': (both(csv(T, X, name='Cork_1.csv'), csv(T, Y, name='cork_2.csv')), {}, "labels 'Cork' and 'cork' differ"),
     'blanks': (both(csv(T, X, name='oak b_1.csv'), csv(T, Y, name='oak  b_2.csv')), {}, 'differ only in case, blanks'),
-    'composed letters': (both(csv(T, X, name='\xfc_1.csv'), csv(T, Y, name='u\u0308_2.csv')), {}, 'differ only in'),
+    'composed letters': (
+        both(csv(T, X, name='\xfc_1.csv'), csv(T, Y, name='u\u0308_2.csv')), {}, r'"u\\u0308" and "\\u00fc" differ',
+    ),
     'codes 0.0 and 1.0': (coded(['0.0'] * 300 + ['1.0'] * 300), CODES, HALVES),
     'codes of savetxt': (coded(['0.000e+00'] * 300 + ['1.000e+00'] * 300), CODES, HALVES),
     'a code without a name': (coded(np.repeat([1, 2], 300)), CODES, 'the label 2 has no name; it is none of 0, 1'),
@@ -243,16 +266,59 @@ LABELS: dict[str, tuple[Write, dict, Truth]] = {
     **{
         f'a copy as {name}': (
             both(csv(T, X), csv(T + 7.0, X, name=f'{name}_2.csv')), {},
-            f"slides '{name}_2.csv/1' and 'cork_1.csv/1' .* have the same samples; a copy is no further slide",
+            f"slides '{name}_2.csv/1' and 'cork_1.csv/1' {SAME}",
         )
         for name in ('cork', 'felt')
     },
+    **{
+        f'rows {rows} as felt': (
+            both(csv(T, X), csv(T[rows], X[rows], name='felt_7.csv')), {},
+            f"'felt_7.csv': the slides 'felt_7.csv/1' and 'cork_1.csv/1' {SAME}",
+        )
+        for rows in (slice(1, None), slice(None, -1), slice(200, 330))
+    },
+    'a copy among others': (
+        both(csv(T, X), csv(T, Y, name='felt_2.csv'), csv(T, np.r_[Y[:400], X[:200]], name='felt_3.csv')), {}, SAME,
+    ),
+    'a long copy': (
+        lambda folder: np.savez(folder / 'cork_1.npz', **{'1/x': LONG, '2/x': LONG[60_001:]}),
+        {**ANY, **RATE, 'tables': '{i}'}, f"'cork_1.npz/1/1' {SAME}".replace('cork_1.npz/1', 'cork_1.npz, 1'),
+    ),
+    **{
+        f'no copy: {name}': (both(csv(T, one), csv(T, other, name='felt_7.csv')), {}, [('cork', one), ('felt', other)])
+        for name, one, other in (
+            ('a period', np.tile(X[:50], 12), np.tile(X[:50], 12)[7:].repeat(2)[:N]),
+            ('a period that begins later', np.tile(X[:100], 6), np.r_[Y[:3], np.tile(X[:100], 6)][:N]),
+            ('few samples', X, np.r_[Y[:300], X[300:350], Y[350:]]),
+        )
+    },
+    'a hum of few levels, and again': (
+        npz(**{f'{number}/x': hum for number, hum in enumerate(HUMS)}), {**ANY, **RATE, 'tables': '{i}'},
+        [('cork', hum) for hum in HUMS],
+    ),
     'a run twice in a file': (
         csv(np.r_[T[:300], 9 + T[:300]], np.tile(X[:300], 2)), {'slides': {'by': 'pause'}},
         "slides 'cork_1.csv/2' and 'cork_1.csv/1'",
     ),
     'a stream that is the same and one that is not': (
         both(csv(X, Y, names='x,y'), csv(X, -Y, names='x,y', name='felt_2.csv')), BOTH, [('cork', X), ('felt', X)],
+    ),
+    'a trial without a label': (
+        csv(T, X, np.repeat([1, 2], 300), np.repeat(['cork', ''], 300), names='t,x,trial,l'),
+        {'label': {'column': 'l'}, 'slides': {'by': 'column', 'column': 'trial'}},
+        "row 302, column 'l': the label is blank in all rows of a slide; write it into each row",
+    ),
+    'a label in the last row of each trial': (
+        csv(T, X, np.repeat([1, 2], 300), [*[''] * 299, 'cork', *[''] * 299, 'felt'], names='t,x,trial,l'),
+        {'label': {'column': 'l'}, 'slides': {'by': 'column', 'column': 'trial'}}, HALVES,
+    ),
+    'groups in the order of their numbers': (
+        npz(**{f'data/{number}/x': number * X for number in (1, 10, 11, 2)}), PARTS | {'label': {'value': 'cork'}},
+        [('cork', number * X) for number in (1, 2, 10, 11)],
+    ),
+    'files in the order of their numbers': (
+        both(*(csv(T, number * X, name=f'cork_{number}.csv') for number in (1, 10, 2))), {},
+        [('cork', number * X) for number in (1, 2, 10)],
     ),
     'a list of labels next to the elements': (grouped, PARTS, "no column 'material'"),
 }  # fmt: skip
@@ -310,6 +376,15 @@ def numbered(columns: str) -> dict:
     return {'streams': {'signal': {'columns': [columns], 'time': {'column': 0}}}}
 
 
+AXES = {'streams': {'signal': {'columns': ['a*'], 'time': {'column': 't'}}}}
+
+
+def far(offset: float, kind: str = 'f8', spread: float = 1.0) -> Write:
+    return npz(
+        x=(np.rint(spread * X) if kind[0] in 'iu' else spread * X).astype('f8').astype(kind) + np.array(offset, kind)
+    )
+
+
 UNUSED: dict[str, Any] = {  # what changes in tables of anybody and is none of sensors, trials or runs
     'a contact': np.repeat([0, 1], 300),
     'a contact as text': np.repeat(['True', 'False'], 300),
@@ -332,20 +407,54 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
         [('cork', window) for window in WINDOWS],
     ),
     **{
-        f'windows of {len(rows[0])} samples every {hop} samples': (
+        f'{len(rows)} windows of {len(rows[0])} samples every {hop} samples, first {rows[0, 0]}': (
             npz(X=rows), {**ANY, 'streams': {'signal': {**BY_ROW, 'samples_per_row': len(rows[0])}},
                           'slides': {'by': 'row'}}, truth,
         )
         for hop, rows, truth in (
-            (60, overlapping(300, 60), '10 of 12 slides begin 60 samples behind the one before, with samples that st'),
-            (25, overlapping(50, 25), '44 of 46 slides begin 25 samples behind'),
+            (60, overlapping(300, 60), f"'cork_1.npz/2' and 'cork_1.npz/1' {SAME}"),
+            (60, overlapping(300, 60)[np.random.default_rng(0).permutation(12)], f"{SAME}"),
+            (25, overlapping(50, 25), f"'cork_1.npz/2' and 'cork_1.npz/1' {SAME}"),
             (50, overlapping(50, 50), [('cork', row) for row in overlapping(50, 50)]),
         )
     },
     'trials that overlap': (
         npz(X=overlapping(50, 20)[..., None]),
-        {**ANY, 'streams': {'signal': BY_ROW}, 'slides': {'by': 'column', 'column': 'trial'}}, 'begin 20 samples beh',
+        {**ANY, 'streams': {'signal': BY_ROW}, 'slides': {'by': 'column', 'column': 'trial'}}, SAME,
     ),
+    'columns in another order': (
+        both(csv(T, X, Y, names='t,ax,ay'), csv(X, 2 * Y, T, names='ay,ax,t', name='felt_1.csv')), AXES,
+        [('cork', np.c_[X, Y]), ('felt', np.c_[2 * Y, X])],
+    ),
+    **{
+        f'a file with {names}': (
+            both(csv(T, X, Y, names='t,ax,ay'), csv(T, X, *more, names=names, name='felt_1.csv')), AXES, sentence,
+        )
+        for names, more, sentence in (
+            ('t,ax', (), "'felt_1.csv': no column 'ay'. Known: ax, t"),
+            ('t,ax,Ay', (2 * Y,), r"'felt_1.csv': no column 'ay'. Known: Ay, ax"),
+            ('t,ax,ay,audio', (2 * Y, Y), r"'felt_1.csv': 'signal' has the column 'audio', and none in .* \(ax, ay\)"),
+        )
+    },
+    **{
+        f'values of {kind} about {offset:g}': (
+            far(offset, kind, spread), {**ANY, **RATE},
+            r"channel 'x' of 'signal' varies by .* bag, which has 32 bits .*: subtract a constant from its column",
+        )
+        for offset, kind, spread in (
+            (2**33, 'i8', 400.0), (2**31, 'u4', 100.0), (101325.0, 'f8', 0.02), (1.01325e8, 'f8', 1.0),
+        )
+    },
+    'whole numbers that are far from 0 and fit': (
+        far(2**24 - 9, 'i4'), {**ANY, **RATE}, [('cork', np.rint(X) + 2**24 - 9)],
+    ),
+    'a constant channel that is rounded': (
+        csv(X, [0.1] * N, names='x,y'), {'streams': {'signal': {'columns': ['x', 'y'], 'rate_hz': 100.0}}},
+        [('cork', np.c_[X, [0.1] * N])],
+    ),
+    'numbers that are too large': (csv(['1e39', *X[1:99], '-4e38', *X[100:]], names='x'), RATE, [
+        ('cork', np.r_[X[1:99], np.nan, X[100:]]),
+    ]),
     'a slide that stands still': (
         both(csv(T, X), csv(T, [1.5] * N, name='felt_1.csv')), {}, CORK,
     ),
@@ -391,6 +500,29 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
         {'rows': {'id': 'a'}, 'conditions': {'force': {'column': 'f', 'unit': 'N'}}}, CORK,
     ),
     'an empty file': (text(''), {}, "' is empty, or has comments only"),
+    **{
+        f'a file of {name}': (binary(content), {}, sentence)
+        for name, content, sentence in (
+            ('gzip', gzip.compress(b't,x'), "'cork_1.csv' is a file of gzip, whatever its name; unpack it"),
+            ('Excel', b'PK\x03\x04' + bytes(99), 'is a file of ZIP or Excel, .*, or save it as CSV in UTF-8'),
+            ('old Excel', b'\xd0\xcf\x11\xe0' + bytes(99), 'is a file of Excel,'),
+            ('UTF-16', 't,x\n1,2\n'.encode('utf-16'), 'is a file of UTF-16, .* in UTF-8'),
+            ('CR', b't,x\r1,2\r3,4\r', 'ends lines with CR alone'),
+        )
+    },
+    'another delimiter': (
+        csv(T, X), {'format': {'delimiter': ';'}}, r"no column 'x'. Known: t,x; see `delimiter` \(';' here\)",
+    ),
+    'lines above the names': (
+        text('Logger 3000\nt,x\n' + lines(T, X)), {}, "no column 'x'. Known: 3000, Logger; .* and `skip_rows`",
+    ),
+    'points that are called commas': (
+        csv(T, X), {'format': {'decimal': ','}}, "'0.0' is not a finite number; if points are decimal, leave out `de",
+    ),
+    'no file of the form': (
+        both(*(csv(T, X, name=f'cork-{run}.csv') for run in range(5))), {},
+        "has the form .*; it has 'cork-0.csv', 'cork-1.csv', 'cork-2.csv'; give",
+    ),
     'seconds': (csv(T, X, (T + 1_700_000_000.4).astype(int), names='t,x,sec'), {}, "'sec': it changes from '17"),
     **{f'column of {name}': (csv(T, X, cells, names='t,x,y'), {}, CORK) for name, cells in UNUSED.items()},
     'all codes at once': (
@@ -575,6 +707,21 @@ SOUND = {**ANY, 'streams': {'signal': {'columns': ['*']}}}
 CONTAINERS: dict[str, tuple[Write, dict, Truth]] = {
     'records of arrays': (
         records, {**ANY, 'streams': {'signal': {'columns': ['d.acc.*'], 'rate_hz': 100.0}}}, [('cork', np.c_[X, Y])],
+    ),
+    'objects': (npz(x=X.astype(object)), {**ANY, **RATE}, 'Object arrays .*; save its arrays as numbers$'),
+    'an array on its side': (
+        npz(**{'1/a': np.c_[T, 0.06 + 0.01 * X, 0.05 + 0.01 * X, 0.1 + 0.01 * Y].T}),
+        {**ANY, **numbered('1-3'), 'tables': '{i}/a'},
+        r"'0': time goes back .*; if the array lies on its side, write format: \{transpose: true\}",
+    ),
+    'sounds of two rates': (
+        both(*(lambda folder, hz=hz: wavfile.write(folder / f'cork_{hz}.wav', hz, X) for hz in (8000, 9000))), SOUND,
+        r"'cork_9000.wav': 'signal' has 9000 Hz by itself, 8000 Hz are expected; look at `rate_hz`",
+    ),
+    'durations': (
+        lambda folder: pq.write_table(
+            pa.table({'x': X, 't': pa.array((1e3 * T).round().astype('m8[ms]'))}), folder / 'cork_1.parquet'
+        ), {**ANY, **timed('ns')}, CORK,
     ),
     'parts that were never written': (h5(1000), {**ANY, **RATE}, 'has parts that were never written'),
     'values with a scale': (h5(scale_factor=0.5, add_offset=3.0), {**ANY, **RATE}, 'has the attribute add_offset'),
@@ -817,6 +964,24 @@ def run(folder: Path, kinds: tuple[str, ...] = MAPPED['table'], **content: Any) 
     source = content.pop('source', folder)
     mapping = mapping_from({'files': '{material}_{run}.*', 'label': {'column': 'material'}, **content})
     return import_tables(mapping, source, folder / 'bags', kinds)
+
+
+def test_what_is_done_with_malformed_rows_is_said(tmp_path: Path) -> None:
+    cells = [f'{t:.2f},{x}' for t, x in zip(T, X, strict=True)]
+    cells[7] = f',{X[7]}'  # without a time
+    cells[20] = '0.20,oops'
+    text('\n'.join(['t,x', *cells])[:-2])(tmp_path)
+    report = run(tmp_path, streams={'signal': {'columns': ['x'], 'time': {'column': 't'}}})
+    assert report.left_out == {
+        'malformed rows, NaN where they are in a slide': 1,
+        'malformed rows, of which the time alone, which is that between the rows around': 1,
+        'malformed rows, which were dropped': 1,
+    }
+    assert [one for [one] in report.examples.values()] == [
+        "'cork_1.csv', row 22, column 'x': 'oops' is not a finite number", "'cork_1.csv', row 9, no finite number",
+        "'cork_1.csv', row 601, column 'all': the line has no end, so it may have been cut off",
+    ]  # fmt: skip
+    assert (report.streams['cork', 'signal']['samples'], report.streams['cork', 'signal']['NaN']) == (N - 1, 1)
 
 
 @pytest.mark.parametrize('every', [2, 10, 25])

@@ -207,6 +207,11 @@ def test_a_column_whose_name_is_a_long_number_is_refused_with_a_sentence(tmp_pat
         import_tables(mapping, tmp_path / 'in', tmp_path / 'out')
 
 
+def test_a_folder_in_place_of_a_mapping_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InvalidParameter, match='is a folder and no mapping; the mapping comes before the source'):
+        load_mapping(tmp_path)
+
+
 def test_a_column_in_braces_and_whole_numbers_are_names() -> None:
     mapping = mapping_from({'streams': {'signal': {'columns': [0, 1, '3-5']}}, 'label': {'value': 7}})
     assert mapping.streams['signal'].columns == ['0', '1', '3-5']

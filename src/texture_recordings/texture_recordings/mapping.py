@@ -263,6 +263,8 @@ class TableMapping:
 
 def load_mapping(name_or_path: str | Path) -> TableMapping:
     """Return the mapping in a file, or one that the package ships in config/mappings, by name."""
+    if Path(name_or_path).is_dir():
+        raise InvalidParameter(f"'{name_or_path}' is a folder and no mapping; the mapping comes before the source")
     path = find_file(str(name_or_path), 'texture_recordings', 'config/mappings', 'mapping')
     mapping = mapping_from(load_yaml(path, 'mapping'), f"mapping '{path}'")
     return mapping if mapping.sensor else replace(mapping, sensor=path.stem)

@@ -52,9 +52,9 @@ class TableFrame:
     clocks: Mapping[str, str] = field(default_factory=dict)  # column → column of its times, s
     lines: AnyArray | None = None  # number in the file of each row
     junk: AnyArray | None = None  # rows with something that is no number
-    reasons: Sequence[str] = ()  # of the first such rows
+    reasons: Mapping[int, str] = field(default_factory=dict)  # of the first such rows, by number in the file
     gaps: AnyArray | None = None  # rows with a condition that is no number
-    gap_reasons: Sequence[str] = ()
+    gap_reasons: Mapping[int, str] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> AnyArray:
         """Return a column; UnknownName with the nearest if there is none."""
@@ -148,11 +148,14 @@ def frames(path: Path, place: str, mapping: TableMapping) -> Iterator[TableFrame
             raise
         except Exception as error:  # whatever a library raises, which depends on the byte that is wrong
             reason = (str(error) or type(error).__name__)[:300]
-            raise InvalidData(f'it cannot be read: {reason}; save it again') from error
+            again = 'save its arrays as numbers' if 'Object arrays' in reason else 'save it again'
+            raise InvalidData(f'it cannot be read: {reason}; {again}') from error
 
 
 # ---- text files
 
+# How files begin that are no texts.
+OTHER_FILES = {b'\x1f\x8b': 'gzip', b'PK\x03\x04': 'ZIP or Excel', b'\xd0\xcf\x11\xe0': 'Excel', b'\xff\xfe': 'UTF-16'}
 DELIMITERS = (',', ';', '\t', '|', ' ')
 BLOCK_ROWS = 20_000  # which are parsed at once
 NO_TEXT = frozenset(('nan', 'na', 'n/a', '#n/a', 'null'))  # 'none' may be a label
@@ -172,12 +175,12 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
     units and means have one.
     """
     form, parts = mapping.format, list[dict[str, AnyArray]]()
-    lines, junk, reasons = list[AnyArray](), list[AnyArray](), list[str]()
-    gapped, gap_reasons = list[AnyArray](), list[str]()
+    lines, junk, reasons = list[AnyArray](), list[AnyArray](), dict[int, str]()
+    gapped, gap_reasons = list[AnyArray](), dict[int, str]()
     with open_regular(path) as opened:
         # The names of the columns, and those that the mapping wants as numbers.
         rest, delimiter, names = _opened(opened, form)
-        numbers, conditions = _wanted(mapping, names)
+        numbers, conditions = _wanted(mapping, names, delimiter)
         numeric: dict[str, bool] = {}
         thousands = Thousands(numbers, form.decimal)
         # Block by block: the cells, what they are, and the rows that are malformed.
@@ -216,8 +219,8 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
                 {numbered[row]: words[row] for row in sorted(words.keys() - bad.keys())},
             )
             left = sorted(gaps.keys() - bad.keys())
-            reasons += [f'row {numbered[row]}, {bad[row]}' for row in sorted(bad)[: EXAMPLES - len(reasons)]]
-            gap_reasons += [f'row {numbered[row]}, {gaps[row]}' for row in left[: EXAMPLES - len(gap_reasons)]]
+            reasons |= {numbered[row]: bad[row] for row in sorted(bad)[: max(0, EXAMPLES - len(reasons))]}
+            gap_reasons |= {numbered[row]: gaps[row] for row in left[: max(0, EXAMPLES - len(gap_reasons))]}
             gapped.append(np.isin(np.arange(len(rows)), left))
             lines.append(np.array(numbered))
             junk.append(np.isin(np.arange(len(rows)), list(bad)))
@@ -236,9 +239,13 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
     )  # fmt: skip
 
 
-def _wanted(mapping: TableMapping, names: Sequence[str]) -> tuple[set[str], set[str]]:
+def _wanted(mapping: TableMapping, names: Sequence[str], delimiter: str) -> tuple[set[str], set[str]]:
     """Return the columns that the mapping wants as numbers, and those of them that are of a condition alone."""
-    samples = {name for one in mapping.streams.values() for name in chosen(one.columns, names, mapping.roles())}
+    try:
+        samples = {name for one in mapping.streams.values() for name in chosen(one.columns, names, mapping.roles())}
+    except UnknownName as error:
+        also = f"`delimiter` ('{delimiter}' here) and `skip_rows` under `format`, if the names of columns are others"
+        raise InvalidData(f'{error}; see {also}') from error
     needed = {*samples, *mapping.texts(), *(one.time.column for one in mapping.streams.values())}
     return {*samples, *mapping.numbers()}, {*mapping.numbers()} - needed
 
@@ -263,8 +270,12 @@ def _refuse_other_rows(names: Sequence[str], malformed: Mapping[int, Sequence[st
 
 def _opened(opened: Any, form: FileFormat) -> tuple[Iterator[tuple[int, str]], str, list[str]]:
     """Return the lines of rows, the delimiter, and the names of the columns by the first row."""
+    if found := [kind for begin, kind in OTHER_FILES.items() if opened.peek(4).startswith(begin)]:
+        raise InvalidData(f'it is a file of {found[0]}, whatever its name; unpack it, or save it as CSV in UTF-8')
     rest = _lines(opened, form)
     first = next(rest, (0, ''))
+    if '\r' in first[1].rstrip('\r\n'):
+        raise InvalidData('it ends lines with CR alone; save it with line ends of Unix or Windows')
     delimiter = form.delimiter or next((one for one in DELIMITERS if one in first[1]), ',')
     names = _names(_cells(first[1], delimiter), form, first[0])
     return rest if form.header else chain([first], rest), delimiter, names
@@ -293,8 +304,11 @@ def _names(cells: Sequence[str], form: FileFormat, line: int) -> list[str]:
 
 
 def _reason(name: str, cell: str, form: FileFormat) -> str:
-    decimal = form.decimal != ',' and math.isfinite(number_of(cell.replace(',', '.')))
-    hint = "; if commas are decimal, write format: {decimal: ','}" if decimal else ''
+    hint = ''
+    if form.decimal == ',' and math.isfinite(number_of(cell)):
+        hint = '; if points are decimal, leave out `decimal` under `format`'
+    elif math.isfinite(number_of(cell.replace(',', '.'))):
+        hint = "; if commas are decimal, write format: {decimal: ','}"
     return f"column '{name}': '{cell[:40]}' is not a finite number{hint}"
 
 
@@ -574,7 +588,10 @@ def _read_parquet(path: Path, place: str, mapping: TableMapping, take: Take) -> 
         if not file.metadata.num_rows:
             raise InvalidData('it has no rows; choose files with samples')
         columns: dict[str, AnyArray] = {}
-        kinds = (types.is_timestamp, types.is_integer, types.is_floating, types.is_boolean, types.is_dictionary)
+        kinds = (
+            types.is_timestamp, types.is_duration, types.is_integer, types.is_floating, types.is_boolean,
+            types.is_dictionary,
+        )  # fmt: skip
         wanted = [one.name for one in schema if one.name in texts or any(is_(one.type) for is_ in kinds)]
         take(file.metadata.num_rows * len(wanted))
         for name, column in zip(wanted, file.read(wanted, use_threads=False).columns, strict=True):
@@ -583,8 +600,9 @@ def _read_parquet(path: Path, place: str, mapping: TableMapping, take: Take) -> 
                 one = one.chunk(0) if hasattr(one, 'chunk') else one
                 words = np.array(['', *(str(text)[:MAX_TEXT] for text in one.dictionary.to_pylist())], dtype=object)
                 columns[name] = words[1 + np.asarray(one.indices.fill_null(-1))]
-            elif types.is_timestamp(column.type):
-                columns[name] = np.asarray(column.to_numpy()).astype('datetime64[ns]').astype(np.int64)
+            elif types.is_timestamp(column.type) or types.is_duration(column.type):
+                one = np.asarray(column.to_numpy())
+                columns[name] = one.astype(f'{one.dtype.kind}8[ns]').astype(np.int64)
             else:
                 one = np.asarray(column.to_numpy())
                 columns[name] = one.astype(np.float64) if one.dtype == object else one  # with gaps
@@ -609,7 +627,7 @@ def _frames(
             groups.setdefault(table, (fields, {}))[1][rest] = name
     if not groups:
         raise InvalidData(f"it has no array of the form '{mapping.tables}'; it has {', '.join(names[:5]) or 'none'}")
-    for table, (fields, members) in sorted(groups.items()):
+    for table, (fields, members) in sorted(groups.items(), key=lambda one: natural(one[0])):
         within = f'{place}, {table}' if table else place
         arrays = {}
         for column, name in members.items():
@@ -619,6 +637,12 @@ def _frames(
         yield TableFrame(
             within, {**_unfolded(arrays, _meant(mapping)), **{key: np.array(text) for key, text in fields.items()}}
         )
+
+
+def natural(name: str) -> list[tuple[int, str]]:
+    """Return the key by which names are in the order of the numbers in them: 'run2' comes before 'run10'."""
+    parts = re.split(r'([0-9]+)', name)
+    return [(int(part[:MAX_TEXT]) if number % 2 else 0, part) for number, part in enumerate(parts)]
 
 
 def _arranged(array: AnyArray, form: FileFormat) -> AnyArray:

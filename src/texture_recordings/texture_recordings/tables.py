@@ -5,15 +5,14 @@
 from __future__ import annotations
 
 import fnmatch
-import hashlib
+import json
 import math
 import re
 import unicodedata
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
-from operator import itemgetter
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -53,19 +52,23 @@ from texture_recordings.readers import (
     chosen,
     frames,
     kind_of,
+    natural,
     number_of,
     placed,
 )
 
 PLAUSIBLE_HZ, LIKELY_HZ = (5.0, 200_000.0), (20.0, 20_000.0)
 LONGEST_SLIDE_S = 1800.0
+LONGEST_TRACK_M = 10.0  # several turns of a turntable; strokes of an arm are below 2 m
+MOST_ROUNDING, NO_CHANGE = 0.01, 1e-12  # of the standard deviation, and of the largest value, by rounding in 64 bits
 NAN = 'have NaN samples, and windows with one are unusable'
 SAME_TIME_S = 1e-9
 MAX_NUMBERED = 3  # columns name_1 … name_n beyond this may be samples: the mapping has to tell
 ROWS_A_CODE = 2  # at least, of a column that may name sensors, trials or runs
 MANY_TEXTS = 50  # different ones are no codes
-SHARED, MOST_HOPS = 4, 1000  # samples that windows share at least, and shifts at which they are compared
-OVERLAPPING = 0.25  # share of slides that overlap with the one before by equally many samples
+RUN, MOST_KNOWN = 64, 32  # changes that two slides share at most, and of these such as came within the last 64
+PART = 100_000  # rows that are compared at once
+SHARED, MOST_HOPS = 16, 1000  # different samples that windows share at least, and shifts at which they are compared
 FLAGS = {'true', 'false', 'yes', 'no', 'on', 'off'}
 CODE_NAME = re.compile(
     r'(?:sensor|finger|trial|run|rep|repeat|repetition|recording|session|pass|stroke)s?[ _-]?(?:id|no|nr|number)?'
@@ -92,7 +95,9 @@ class ImportReport:
     conditions: dict[tuple[str, str], list[float]] = field(default_factory=lambda: defaultdict(list))
     left_out: Counter[str] = field(default_factory=Counter)  # by reason
     examples: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
-    names: dict[bytes, str] = field(default_factory=dict)  # of slides, by the digest of their samples
+    columns: dict[str, list[str]] = field(default_factory=dict)  # of each stream in the first file
+    runs: dict[str, dict[int, str]] = field(default_factory=lambda: defaultdict(dict))  # see `refuse_copy`
+    last: dict[str, tuple[str, AnyArray]] = field(default_factory=dict)  # name and samples of the slide before
 
     def leave_out(self, reason: str, count: int, *examples: str) -> None:
         """Count what is left out, with the first places."""
@@ -101,15 +106,29 @@ class ImportReport:
             self.examples[reason] += examples[: EXAMPLES - len(self.examples[reason])]
 
     def refuse_copy(self, name: str, streams: SlideStreams) -> None:
-        """Refuse a slide that has the samples of one before: in training and test it would be no independent one."""
-        digest = hashlib.sha256()
+        """Refuse a slide that has samples of one before: in training and test it would be no independent one.
+
+        That is, in each stream, all samples or `RUN` changes in turn; twice as many are found wherever they begin.
+        """
+        others = []
         for topic, (signal, _) in streams.items():
-            digest.update(f'{topic} {signal.samples.shape}'.encode() + signal.samples.tobytes())
-        other = self.names.setdefault(digest.digest(), name)
-        if other != name:
+            known, marks = self.runs[topic], [hash(signal.samples.tobytes())]
+            same = known.keys() & marks
+            for at in range(0, len(signal.samples), PART):
+                runs, more = _runs(signal.samples[at : at + PART])
+                same |= known.keys() & runs
+                marks += more
+            others.append({known[one] for one in same})
+            if topic in self.last and _goes_on(self.last[topic][1], signal.samples):
+                others[-1].add(self.last[topic][0])
+            self.last[topic] = name, signal.samples
+            for one in marks:
+                known.setdefault(one, name)
+        if all(others):
             raise InvalidData(
-                f"the slides '{name}' and '{other}' (file/number of the slide) have the same samples; a copy is no "
-                'further slide, remove one of them, or its row or file'
+                f"the slides '{name}' and '{min(others[0])}' (file/number of the slide) have the same samples "
+                'in all or in a part; a copy is no further slide, nor is an overlapping window: remove one of them, or '
+                'its row or file'
             )
 
     def refuse_like_labels(self, names: Mapping[str, str]) -> None:
@@ -118,9 +137,12 @@ class ImportReport:
         for label in sorted(self.slides):
             other = like.setdefault(_plain(label), label)
             if other != label and not {label, other} <= {*names.values()}:
+                # What looks the same is shown by its codes, as YAML reads them.
+                alike = unicodedata.normalize('NFC', other) == unicodedata.normalize('NFC', label)
+                one, same = map(json.dumps if alike else repr, (other, label))
                 raise InvalidData(
-                    f"the labels '{other}' and '{label}' differ only in case, blanks, signs or digits behind the "
-                    f"point; write both under `label`, such as names: {{'{other}': '{label}', '{label}': '{label}'}}"
+                    f'the labels {one} and {same} differ only in case, blanks, signs, the coding of letters or digits '
+                    f'behind the point; write both under `label`, such as names: {{{one}: {same}, {same}: {same}}}'
                 )
 
     def lines(self) -> list[str]:
@@ -216,7 +238,8 @@ def _files(
         if place.count('/') != depth and path.is_file() and kind_of(path) in kinds and not is_bag(path.parent):
             report.leave_out('files lie in more or fewer folders than `files` names', 1, f"'{place}'")
     # Not those of the walk above, which does not follow links to folders.
-    for path in [source] if whole else sorted(source.glob('/'.join('*' * (depth + 1)))):
+    found = [source] if whole else source.glob('/'.join('*' * (depth + 1)))
+    for path in sorted(found, key=lambda path: natural(path.as_posix())):
         place = path.name if whole else path.relative_to(source).as_posix()
         fields = template_fields(mapping.files, place)
         if path.is_dir() and not is_bag(path):
@@ -233,9 +256,10 @@ def _files(
             report.files += 1
             yield path, place, fields
     if not report.files:
+        has = ', '.join([*chain(*report.examples.values())][:EXAMPLES])
         raise InvalidData(
-            f"no file in '{source}' has the form '{mapping.files}' and one of the endings {', '.join(kinds)}; "
-            'give the folder that holds them, or correct `files` in the mapping'
+            f"no file in '{source}' has the form '{mapping.files}' and one of the endings {', '.join(kinds)}; it has "
+            f'{has or "none"}; give the folder that holds them, or correct `files` in the mapping'
         )
 
 
@@ -269,12 +293,20 @@ class FrameSlides:
         self._frame = self._wanted_rows(frame)
         names = [name for name, array in self._frame.columns.items() if array.ndim]
         other = {**dict.fromkeys(frame.clocks.values(), 'time'), **mapping.roles()}
-        self._used = {name: chosen(one.columns, names, other) for name, one in mapping.streams.items()}
+        self._used: dict[str, list[str]] = {}
+        for name, stream in mapping.streams.items():  # in the order of the first file, whose channels all have
+            columns = chosen(stream.columns, names, other)
+            first = report.columns.setdefault(name, columns)
+            if more := [column for column in columns if column not in first]:
+                raise InvalidData(
+                    f"'{name}' has the column '{more[0]}', and none in the first file ({', '.join(first[:5])}); name "
+                    'those that all files have, or give each kind of file a mapping'
+                )
+            self._used[name] = chosen(first, names, other)
         self._texts = {name: self._frame.texts(name) for name in mapping.texts()}
         numbers = [*(column for columns in self._used.values() for column in columns), *mapping.numbers()]
         self._numbers = {name: self._frame.numbers(name) for name in numbers}
-        self._malformed: dict[int, AnyArray] = {}  # by number of rows
-        self._held: dict[str, AnyArray] = {}
+        self._malformed: dict[tuple[int, str], AnyArray] = {}  # by number of rows and what is done with them
         streams = [self._stream(name, params) for name, params in mapping.streams.items()]
         self._check_malformed()
         # Slides are cut by the rows of the stream that corresponds to the column at which they end.
@@ -294,8 +326,6 @@ class FrameSlides:
         """Yield what `SlideBags.write` takes."""
         params, reference, short, inside = self._mapping.slides, self._reference, 0, 0
         times = reference.at_s
-        before: AnyArray = np.empty(0)
-        hops = Counter[int]()
         for number, span in enumerate(self._spans, 1):
             rows = span.stop - span.start
             inside += rows
@@ -309,18 +339,7 @@ class FrameSlides:
             if still:
                 self._report.leave_out(f"slides in which no channel of '{still[0]}' changes", 1, where)
                 continue
-            slide = self._slide(span, span_s, number)
-            samples = next(iter(slide[2].values()))[0].samples
-            hops[_hop(before, samples)] += 1
-            before = samples
-            yield slide
-        hop, count = max(((hop, count) for hop, count in hops.items() if hop), default=(0, 0), key=itemgetter(1))
-        if count and count >= OVERLAPPING * (hops.total() - 1):
-            raise InvalidData(
-                f'{count} of {hops.total()} slides begin {hop} samples behind the one before, with samples that stand '
-                'in it: they are windows of one recording and no independent slides; give whole recordings as slides, '
-                'which are cut into windows later'
-            )
+            yield self._slide(span, span_s, number)
         if short > MAX_LEFT_OUT * inside and short < inside and params.min_s == type(params).min_s:
             raise InvalidData(
                 f'{short} of {inside} rows lie in slides that are shorter than {params.min_s:g} s; look at `slides` in '
@@ -341,9 +360,10 @@ class FrameSlides:
             good = np.flatnonzero(np.ones(len(mask)) if frame.junk is None else ~frame.junk)
             between = (np.diff(good) > 1).any()  # behind the last good row nothing shifts
             if between and any(not one.time.column for one in self._mapping.streams.values()):
+                line, reason = next(iter(frame.reasons.items()))
                 raise InvalidData(
-                    f'{frame.reasons[0]}: of a malformed row nobody knows whether it is one of those under `rows`, so '
-                    'without a column of time the rows behind it may shift; give one, or remove the row'
+                    f'row {line}, {reason}: of a malformed row nobody knows whether it is one of those under `rows`, '
+                    'so without a column of time the rows behind it may shift; give one, or remove the row'
                 )
             self._report.leave_out('rows are not those under `rows`', int((~mask).sum()))
             lines = np.arange(len(mask)) if frame.lines is None else frame.lines
@@ -375,15 +395,13 @@ class FrameSlides:
                 f"the stream '{name}' has {len(names)} columns for {len(channels)} channels of "
                 f'samples_per_row: {per_row}; give a name for each channel, and the number of its columns in a row'
             )
-        if len(self._report.channels.setdefault(name, channels)) != len(channels):
-            before = len(self._report.channels[name])
-            raise InvalidData(f"'{name}' has {len(channels)} channels, {before} before; give each sensor a mapping")
+        self._report.channels[name] = channels
         self._check_groups(name, params.samples_per_row, group[1])
-        with np.errstate(over='ignore'):
-            values = [np.atleast_1d(self._numbers[column] * params.scale).astype(np.float32) for column in names]
-        samples = np.stack(values, axis=1)
+        samples = np.stack([np.atleast_1d(self._numbers[column] * params.scale) for column in names], axis=1)
+        samples[np.abs(samples) > np.finfo(np.float32).max] = np.nan  # a bag has no such numbers
         # Of streams with a column of time, rows in which another one alone has a value are none of the slower one.
         kept, bad = np.ones(len(samples), dtype=bool), ~np.isfinite(samples).all(axis=1)
+        untimed = np.zeros_like(bad)
         for other in {column for one in self._used.values() for column in one} if params.time.column else ():
             if self._group(other) == group:
                 kept &= ~(np.isnan(samples).all(axis=1) & np.isfinite(self._numbers[other]))
@@ -397,7 +415,7 @@ class FrameSlides:
             raw = self._frame.numbers(clock)
             if raw.size != len(samples):
                 raise InvalidData(f"column '{clock}' has {raw.size} rows, '{name}' {len(samples)}")
-            bad |= np.isnan(raw)
+            untimed = np.isnan(raw)
             raw = with_malformed(raw, kept) * TIME_UNITS[params.time.unit if params.time.column else 's']
             kept &= np.isfinite(raw)
             try:
@@ -406,7 +424,12 @@ class FrameSlides:
                 raise self._fault(clock, np.flatnonzero(kept)[fault.row], fault) from fault
         elif not bad.all():  # malformed rows above the samples and below them are none
             kept[: int(np.argmin(bad))] = kept[len(bad) - int(np.argmin(bad[::-1])) :] = False
-        self._malformed[len(bad)] = self._malformed.get(len(bad), False) | bad
+        for done, found in (
+            ('malformed rows, NaN where they are in a slide', bad & kept),
+            ('malformed rows, of which the time alone, which is that between the rows around', untimed & kept & ~bad),
+            ('malformed rows, which were dropped', (bad | untimed) & ~kept),
+        ):
+            self._malformed[len(bad), done] = self._malformed.get((len(bad), done), False) | found
         rows = np.flatnonzero(kept)
         return Stream(name, params, channels, samples[rows], rows, time_s, clock, group, per_row)
 
@@ -431,24 +454,27 @@ class FrameSlides:
             )
 
     def _fault(self, column: str, row: int, reason: object) -> InvalidData:
+        if self._frame[column].size < len(self._frame.columns) and self._frame.lines is None:
+            reason = f'{reason}; if the array lies on its side, write format: {{transpose: true}}'
         return InvalidData(f"row {self._line(row)}, column '{column}': {reason}")
 
     def _check_malformed(self) -> None:
         """Count malformed rows of streams and cells of conditions; InvalidData if they are too many."""
-        frame, faults = self._frame, list[tuple[str, int, int, Sequence[str]]]()
-        if frame.gaps is not None and frame.gaps.any():
-            count, length = int(frame.gaps.sum()), len(frame.gaps)
-            faults.append(('rows with a condition that is no number', count, length, frame.gap_reasons))
-        for length, bad in self._malformed.items():
-            count = int(bad.sum())
-            first = f'row {self._line(int(bad.argmax()))}, no finite number' if count else 'no row at all'
-            faults.append(('malformed rows, NaN where they are in a slide', count, length, frame.reasons or [first]))
-            self._report.rows += length
-        for reason, count, length, places in faults:
-            self._report.leave_out(reason, count, *(f"'{self._place}', {place}" for place in places))
-            if not length or count > MAX_LEFT_OUT * length:
+        frame, found, counts = self._frame, dict(self._malformed), Counter[tuple[int, str]]()
+        self._report.rows += sum({length for length, _ in found})
+        if frame.gaps is not None:
+            found[len(frame.gaps), 'rows with a condition that is no number'] = frame.gaps
+        for (length, done), rows in found.items():
+            counts[length, done.split(', ')[0]] += int(rows.sum())
+        for (length, done), rows in found.items():
+            what, reasons = done.split(', ')[0], frame.gap_reasons if rows is frame.gaps else frame.reasons
+            marked = frame.lines[rows] if frame.lines is not None and len(frame.lines) == length else rows.nonzero()[0]
+            known = [line for line in reasons if line in marked] or marked[:1].tolist()
+            places = [f'row {line}, {reasons.get(line, "no finite number")}' for line in known] or ['no row at all']
+            self._report.leave_out(done, len(marked), *(f"'{self._place}', {place}" for place in places))
+            if not length or (len(marked) and counts[length, what] > MAX_LEFT_OUT * length):
                 raise InvalidData(
-                    f'it has {count} {reason.split(", ")[0]} of {length}, first {places[0]}; at most '
+                    f'it has {counts[length, what]} {what} of {length}, first {places[0]}; at most '
                     f'{100 * MAX_LEFT_OUT:g} % are taken; look at the columns and at `format` in the mapping'
                 )
 
@@ -533,15 +559,15 @@ class FrameSlides:
         # Of the first file: windows of all are to have as many samples.
         rate_hz = self._report.rates_hz.get(name) or params.rate_hz or measured
         if measured and not 1 / SAME_RATE <= measured / rate_hz <= SAME_RATE:
+            by, where = ('itself', '') if stream.time_s is None else ('its times', f"the unit of '{stream.clock}' and ")
             raise InvalidData(
-                f"'{name}' has {measured:g} Hz by its times, {rate_hz:g} Hz are expected; look at the unit of column "
-                f"'{stream.clock}' and at `rate_hz` in the mapping"
+                f"'{name}' has {measured:g} Hz by {by}, {rate_hz:g} Hz are expected; look at {where}`rate_hz` in the "
+                'mapping, and give each rate another one'
             )
         low, high = PLAUSIBLE_HZ
         if not params.rate_hz and not low <= rate_hz <= high:
-            of_unit = {one: rate_hz * TIME_UNITS[params.time.unit] / factor for one, factor in TIME_UNITS.items()}
-            likely = [one for one, other_hz in of_unit.items() if LIKELY_HZ[0] <= other_hz <= LIKELY_HZ[1]]
-            hint = f'; with unit: {likely[0]} it were {of_unit[likely[0]]:g} Hz' if likely else ''
+            likely = [f'; with unit: {one} it were {rate_hz / factor:g} Hz' for one, factor in _units(params, rate_hz)]
+            hint = likely[0] if likely else ''
             raise InvalidData(
                 f"the rate of '{name}' is {rate_hz:g} Hz by its times{hint}; give a column of time that grows and its "
                 f'unit, or `rate_hz`, from {low:g} to {high:g}'
@@ -568,16 +594,14 @@ class FrameSlides:
         return np.where(held >= 0, values[np.maximum(held, 0)], '' if columns is self._texts else math.nan)
 
     def _value(self, name: str, rows: slice, kind: str) -> str:
-        """Return the one value that a column has during a slide, the last one before it where it has none."""
-        if not self._texts[name].ndim and self._texts[name][()]:
-            return str(self._texts[name])
-        if name not in self._held:
-            texts = self._aligned(self._texts, name)
-            self._held[name] = texts[np.maximum.accumulate(np.where(texts != '', np.arange(len(texts)), 0))]
-        held = self._held[name][rows]
+        """Return the one value that a column has during a slide."""
+        held = self._aligned(self._texts, name, rows)
         known = np.flatnonzero(held != '')
         if not len(known):
-            raise InvalidData(f"column '{name}' has no value during a slide; name another")
+            raise self._fault(
+                name, self._reference.rows[rows.start], f'the {kind} is blank in all rows of a slide; write it into '
+                'each row, or name another column'
+            )  # fmt: skip
         first = str(held[known[0]])
         other = known[held[known] != first]
         if len(other):
@@ -595,19 +619,23 @@ class FrameSlides:
         if not surface:
             raise InvalidData('a slide has an empty label; name another column under `label`')
         session = self._value(self._mapping.session, rows, 'session') if self._mapping.session else surface
-        if end_s - begin_s > LONGEST_SLIDE_S:
-            raise InvalidData(
-                f'row {self._line(self._reference.rows[rows.start])}: a slide lasts {end_s - begin_s:.4g} s, at most '
-                f'{LONGEST_SLIDE_S:g} s are plausible; look at the column of time, its unit and `slides`'
-            )
-        streams = {one.name: self._samples(one, surface, rows, span_s) for one in self._streams}
-        self._report.with_nan += any(np.isnan(signal.samples).any() for signal, _ in streams.values())
         known: dict[str, Any] = {}
         for name, column in CONDITION_COLUMNS.items():
             mean = self._condition(name, rows)
             if math.isfinite(mean):
                 self._report.conditions[surface, name].append(self._plausible(name, mean))
                 known[column] = mean
+        lasts_s, speed_m_s = end_s - begin_s, known.get('speed_m_s', 0.0)
+        if lasts_s > LONGEST_SLIDE_S or lasts_s * speed_m_s > LONGEST_TRACK_M:
+            track = f' at {speed_m_s:.3g} m/s, so it has {lasts_s * speed_m_s:.3g} m' if speed_m_s else ''
+            units = [unit for unit, factor in _units(self._reference.params, self._reference.rate_hz) if factor < 1.0]
+            raise InvalidData(
+                f'row {self._line(self._reference.rows[rows.start])}: a slide lasts {lasts_s:.4g} s{track}; at most '
+                f'{LONGEST_SLIDE_S:g} s and {LONGEST_TRACK_M:g} m are plausible; look at `slides`, the speed and the '
+                f'column of time with its unit{", which may be " * bool(units)}{"".join(units[:1])}'
+            )
+        streams = {one.name: self._samples(one, surface, rows, span_s) for one in self._streams}
+        self._report.with_nan += any(np.isnan(signal.samples).any() for signal, _ in streams.values())
         self._report.slides[surface] += 1
         name, motion = f'{self._place}/{number}', self._mapping.motion
         state = ExplorationState(0, name, motion, Phase.SLIDE, surface=surface, **known)
@@ -663,16 +691,34 @@ class FrameSlides:
         count = stream.per_row
         flat = samples[rows].reshape(len(rows), -1, count).transpose(0, 2, 1).reshape(len(rows) * count, -1)
         self._report.streams[surface, stream.name]['NaN'] += int(np.isnan(flat).any(axis=1).sum())
+        single = self._single(stream, flat)
         units, sensor = (stream.params.unit,) * len(stream.channels), self._mapping.sensor
-        signal = TactileSignal(0, sensor, stream.channels, units, stream.rate_hz * count, 0, flat, sensor)
+        signal = TactileSignal(0, sensor, stream.channels, units, stream.rate_hz * count, 0, single, sensor)
         return signal, np.add.outer(index * count, np.arange(count)).ravel()
+
+    def _single(self, stream: Stream, samples: Array) -> AnyArray:
+        """Return samples in 32 bits, as a bag has them; InvalidData if a channel is too far from 0 for that."""
+        single = samples.astype(np.float32)
+        known = np.isfinite(samples).all(axis=1)
+        for channel, exact, error in zip(stream.channels, samples[known].T, (single - samples)[known].T, strict=True):
+            spread, far, off = (
+                exact.std() if known.any() else 0.0,
+                *(abs(one).max(initial=0.0) for one in (exact, error)),
+            )
+            if spread > NO_CHANGE * far and off > MOST_ROUNDING * spread:
+                raise InvalidData(
+                    f"channel '{channel}' of '{stream.name}' varies by {spread:.3g} (standard deviation) at {far:.9g}; "
+                    f'there a bag, which has 32 bits for a number, is off by up to {off:.2g}: subtract a constant from '
+                    'its column, or correct `scale` in the mapping'
+                )
+        return single
 
     # ---- conditions
 
     def _plausible(self, name: str, value: float) -> float:
         """Return the mean of a condition over a slide; InvalidData if no finger reaches it."""
         low, high = PLAUSIBLE[name]
-        if low <= value <= high or (value == 0.0 and name != 'direction'):
+        if low <= value <= high:
             return value
         units = CONDITION_UNITS[name]
         given = self._mapping.conditions[name].unit or next(iter(units))
@@ -680,7 +726,7 @@ class FrameSlides:
         likely = [unit for unit, factor in units.items() if low <= number * factor <= high]
         raise InvalidData(
             f'the {name} of a slide is {number:.4g} {given}, plausible are {low / units[given]:.3g} to '
-            f'{high / units[given]:.3g} {given}; look at its unit in the mapping'
+            f'{high / units[given]:.3g} {given}; leave out what is unknown, or look at its unit in the mapping'
             + (f', which may be {" or ".join(likely)}' if likely else '')
         )
 
@@ -702,6 +748,12 @@ class FrameSlides:
         return abs(mean) if name == 'force' else mean
 
 
+def _units(params: StreamColumns, rate_hz: float) -> list[tuple[str, float]]:
+    """Return the units that times may have at a likely rate, and the factors by which they are then shorter."""
+    factors = {unit: factor / TIME_UNITS[params.time.unit] for unit, factor in TIME_UNITS.items() if params.time.column}
+    return [(unit, one) for unit, one in factors.items() if LIKELY_HZ[0] <= rate_hz / one <= LIKELY_HZ[1]]
+
+
 def _changes(stream: Stream, within: slice) -> bool:
     """Return whether a channel changes within some rows, or one sample is all there is."""
     samples = stream.samples[within]
@@ -710,15 +762,35 @@ def _changes(stream: Stream, within: slice) -> bool:
     return known.size < 2 * len(stream.channels) or bool((channels != channels[:1, :, :1]).any())
 
 
-def _hop(before: AnyArray, after: AnyArray) -> int:
-    """Return how many samples behind the begin of a window the next one begins, 0 if they do not overlap."""
-    if before.shape == after.shape:
-        begins = (before == after[0]).all(axis=1) & (before[-1] == after[::-1]).all(axis=1)
-        for hop in np.flatnonzero(begins[: 1 - SHARED])[:MOST_HOPS].tolist():
-            shared = before[hop:]
-            if hop and (shared != shared[0]).any() and np.array_equal(shared, after[: len(shared)]):
-                return int(hop)
-    return 0
+def _runs(samples: AnyArray) -> tuple[list[int], list[int]]:
+    """Return a hash of each `RUN` successive changes of a slide, a change being a sample and how long it lasts.
+
+    The second list has those that begin at each `RUN`th change. Runs of few levels, as of coarse or periodic signals,
+    and runs that come again within the slide are left out: by chance or period other slides have them, too.
+    """
+    rows = np.ascontiguousarray(samples).view(np.uint32)
+    starts = np.flatnonzero((rows[1:] != rows[:-1]).any(axis=1)) + 1
+    if len(starts) <= RUN:
+        return [], []
+    changes = np.column_stack([rows[starts[:-1]], np.diff(starts)]).astype(np.uint64)
+    codes = changes @ (2 * np.random.default_rng(0).integers(2**62, size=changes.shape[1], dtype=np.uint64) + 1)
+    order = np.argsort(codes, kind='stable')
+    again = np.zeros(len(codes), dtype=bool)
+    again[order[1:]] = (np.diff(codes[order]) == 0) & (np.diff(order) < RUN)
+    known = np.lib.stride_tricks.sliding_window_view(again, RUN).sum(axis=1)
+    for step in (2**power for power in range(RUN.bit_length() - 1)):  # of twice as many changes each time
+        codes ^= codes >> np.uint64(29)
+        codes = codes[:-step] * np.uint64(0x9E3779B97F4A7C15) + codes[step:]
+    _, places, counts = np.unique(codes, return_inverse=True, return_counts=True)
+    single = (known <= MOST_KNOWN) & (counts[places] == 1)
+    return codes[single].tolist(), codes[::RUN][single[::RUN]].tolist()
+
+
+def _goes_on(before: AnyArray, after: AnyArray) -> bool:
+    """Return whether a slide begins with the last samples of the one before, as short windows do that overlap."""
+    begins = np.flatnonzero((before[: 1 - SHARED] == after[0]).all(axis=1))[-MOST_HOPS:].tolist()
+    ends = [before[at:] for at in begins if np.array_equal(before[at:], after[: len(before) - at])]
+    return any(len(np.unique(end, axis=0)) >= SHARED for end in ends)
 
 
 def _is_one_of(text: str, wanted: Sequence[str]) -> bool:

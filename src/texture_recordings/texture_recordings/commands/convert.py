@@ -52,6 +52,8 @@ def _import(options: argparse.Namespace) -> int:
 def _import_mapped(options: argparse.Namespace) -> list[Path]:
     mapping, source, out = options.places
     out = None if options.dry_run else out
+    if out is not None and Path(source).resolve() in (Path(out).resolve(), *Path(out).resolve().parents):
+        raise InvalidParameter(f"'{out}' lies in '{source}', among the files that are read; name a folder elsewhere")
     report = import_tables(load_mapping(mapping), source, out, MAPPED[options.data_set])
     for line in report.lines():
         print(line)
