@@ -142,7 +142,9 @@ class CheckedPath(type(Path())):  # type: ignore[misc]
         if whole:
             return file
         if not end:
-            raise FileRefused('it was cut off before its first part was complete, so nothing of it can be read')
+            raise FileRefused(
+                'it was cut off before its first part was complete, so nothing of it can be read; record it again'
+            )
         logging.getLogger(__name__).warning("'%s' was cut off; it has nothing behind its last whole chunk", self)
         return cast('IO[Any]', _Ended(file, end))
 
@@ -551,7 +553,9 @@ def _read(
                 name = names.get(connection.topic, connection.topic)
                 yield name, RawMessage(connection.topic, connection.msgtype, log_ns, data)
             if missing and start_ns is None and stop_ns is None:
-                raise FileRefused(f'{missing} of its messages are missing; record it again')
+                raise FileRefused(
+                    f'{missing} of its messages are missing; record it again, or remove metadata.yaml and use the rest'
+                )
     except TextureError:
         raise
     except FileRefused as error:
