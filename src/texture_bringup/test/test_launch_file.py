@@ -11,6 +11,7 @@ from texture_bringup.launcher import (
     NodeDescription,
     command,
     expand,
+    find_launch_file,
     joined_namespace,
     read,
     typed,
@@ -117,6 +118,25 @@ def test_an_undeclared_argument_gets_the_nearest_also_of_one_behind_a_condition(
     assert launch(elements, model='x') == []
     with pytest.raises(UnknownName, match="'model'"):
         launch(elements, modl='x')
+
+
+@pytest.mark.parametrize('name', ['emulator', 'replay'])
+@pytest.mark.parametrize('given', [{}, {'model': 'my/model.npz'}, {'model': 'm.npz', 'recipe': 'ets-linear-svm'}])
+def test_the_features_are_those_of_the_model_unless_a_recipe_is_given(name: str, given: dict[str, str]) -> None:
+    nodes = read(find_launch_file(name), {'bag': 'my_bag', **given}, os.environ)
+    [extractor] = [node for node in nodes if node.executable == 'feature_extractor']
+    assert extractor.parameters[0] == {'recipe': given.get('recipe', given.get('model', ''))}
+
+
+@pytest.mark.parametrize(
+    ('given', 'listeners'),
+    [({}, 'classifier'), ({'roughness_model': 'rough.json', 'end': 'true'}, 'classifier roughness_estimator')],
+)
+def test_a_replay_waits_for_all_estimators_that_it_starts(given: dict[str, str], listeners: str) -> None:
+    nodes = read(find_launch_file('replay'), {'bag': 'my_bag', **given}, os.environ)
+    [replay] = [node for node in nodes if node.executable == 'replay']
+    assert {'listeners': listeners} in replay.parameters
+    assert {node.name for node in nodes} >= set(listeners.split())
 
 
 def test_a_group_keeps_its_changes_to_itself(launch) -> None:

@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.executors import (
     Executor,
@@ -62,6 +63,7 @@ from texture_core.types import (
 
 LEVELS = {'OK': DiagnosticStatus.OK, 'WARN': DiagnosticStatus.WARN, 'ERROR': DiagnosticStatus.ERROR}
 ENDED = 'ended'  # the value that the last report of a node carries
+LISTENERS = 'listeners'  # the value of a feature extractor: names of the nodes that get its vectors
 PERIOD_S = 1.0
 ACKNOWLEDGED_S = 1.0  # the longest that a node waits at its end for the readers of that report
 DiagnosticReport = tuple[str, str, Mapping[str, Any]]
@@ -75,7 +77,8 @@ class Diagnostics:
         self._report = report
         self.hardware_id = hardware_id
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        self._timer = node.create_timer(PERIOD_S, self.publish)
+        # With use_sim_time the node's time stands still until the recording begins.
+        self._timer = node.create_timer(PERIOD_S, self.publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def publish(self) -> None:
         """Publish the status now."""

@@ -225,6 +225,9 @@ class Window:
         return len(self.samples) / self.rate_hz
 
 
+# What sends samples that are numbered from 0 again.
+RESTARTED = 'a driver or bridge, or none where a replay went on to its next bag'
+
 # --------------------
 # The features of one window of sliding.
 
@@ -235,7 +238,7 @@ class FeatureVector:
 
     `feature_set` is the fingerprint of the windows, inputs and features that made the values: a model refuses
     vectors of another fingerprint. `skipped` counts the windows left out so far for lost or non-finite samples.
-    `sequence` counts the vectors that its sender has sent before: a jump is a loss.
+    `sequence` counts the vectors of the exploration that were sent before: a jump is a loss.
     `motion`, `direction_rad` and `sensor` describe the measurement of the window, as `speed_m_s` and `force_n` do.
     """
 

@@ -15,7 +15,7 @@ from texture_core.ros import ESTIMATE_QOS, FEATURE_QOS, from_msg, to_msg
 from texture_core.ros_testing import LocalGraph
 from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.model import load_model
-from texture_estimation.nodes.classifier import Classifier
+from texture_estimation.nodes.classifier import IN_PART, Classifier
 from texture_estimation.nodes.roughness_estimator import RoughnessEstimator
 from texture_estimation.roughness import (
     Grades,
@@ -46,11 +46,11 @@ class NodeUnderTest:
         self.features = peer.create_publisher(msg.FeatureVector, 'features', FEATURE_QOS)
         graph.until(lambda: self.features.get_subscription_count() and peer.count_publishers(topic) == 1)
 
-    def ask(self, vectors):
-        """Publish vectors and return the estimates up to the final one."""
+    def ask(self, vectors, first=0):
+        """Publish vectors, with their numbers from `first` on, and return the estimates up to the final one."""
         self._received.clear()
-        for vector in vectors:
-            self.features.publish(to_msg(vector))
+        for number, vector in enumerate(vectors, first):
+            self.features.publish(to_msg(dataclasses.replace(vector, sequence=number)))
         self._graph.until(lambda: self._received and self._received[-1].final)
         return [from_msg(message) for message in self._received]
 
@@ -139,16 +139,18 @@ def test_broken_messages_are_counted_and_survived(graph, case):
     assert node.report()[2]['invalid_messages'] == 1
 
 
-def test_vectors_that_do_not_come_are_counted_and_a_new_extractor_begins_again(graph, case):
+def test_an_estimate_without_all_vectors_of_its_exploration_says_so_and_the_next_one_is_whole(graph, case):
     kind, path, vectors = case
     node = NodeUnderTest(graph, kind, path)
-    numbered = [dataclasses.replace(vector, sequence=7 + k) for k, vector in enumerate(vectors)]
-    node.ask(numbered)
-    assert (node.report()[0], node.report()[2]['lost_vectors']) == ('OK', 0)
-    node.ask([dataclasses.replace(vectors[-1], sequence=9 + len(vectors))])  # two of the same extractor are missing
-    assert (node.report()[0], node.report()[2]['lost_vectors']) == ('WARN', 2)
-    node.ask([dataclasses.replace(vectors[-1], sequence=1)])  # and the first of another one
-    assert node.report()[2]['lost_vectors'] == 3
+    whole = node.ask(vectors)
+    assert node.report()[2]['lost_vectors'] == 0
+    part = node.ask(vectors[1:], first=1)  # the node was found after the first vector
+    assert all(estimate.message.startswith(IN_PART) for estimate in part)
+    assert (node.report()[0], node.report()[2]['lost_vectors']) == ('WARN', 1)
+    node.features.publish(to_msg(vectors[0]))
+    assert node.ask(vectors[1:])[-1].message.startswith(IN_PART)  # another extractor, amidst the exploration
+    assert [estimate.message for estimate in node.ask(vectors)] == [estimate.message for estimate in whole]
+    assert node.report()[2]['lost_vectors'] == 1
 
 
 def test_a_wrong_model_at_the_start_is_an_error(graph, case, tmp_path):

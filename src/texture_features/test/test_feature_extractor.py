@@ -107,6 +107,7 @@ def test_a_slide_whose_sensor_died_ends_all_the_same(bench):
     bench.until(lambda: bench.features and bench.features[-1].last)
     assert bench.features[-1].skipped == 4
     assert [vector.sequence for vector in bench.features] == list(range(len(bench.features)))
+    assert bench.node._report()[2]['listeners'] == bench.graph.peer.get_name()
     bench.until(lambda: any('no message yet on signal' in report.status[0].message for report in bench.reports))
 
 
@@ -124,7 +125,8 @@ def test_known_losses_are_counted_and_those_of_a_restart_named_as_unknown(bench)
     for first_sample in (0, 20, 90, 0):  # 50 samples are missing, then the bridge was started again
         bench.node._on_signal('signal', to_msg(replace(recording(0.02)[0], first_sample=first_sample)))
     level, sentence, numbers = bench.node._report()
-    assert (level, sentence) == ('WARN', '50 samples lost, and unknown losses in a restart of a driver or bridge')
+    assert level == 'WARN'
+    assert sentence.startswith('50 samples lost, and unknown losses in a restart of a driver or bridge')
     assert (numbers['lost_samples'], numbers['restarts']) == (50, 1)
     assert bench.node._report()[:2] == ('OK', 'extracting')
 

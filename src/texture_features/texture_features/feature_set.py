@@ -14,12 +14,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain, combinations, groupby
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.config import find, find_file, from_mapping, load_card, load_yaml, param, safe_repr
+from texture_core.config import find, find_file, from_mapping, load_card, load_yaml, param, safe_repr, shipped
 from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch, UnknownName
 from texture_core.types import NANOSECONDS, AnyArray, Array, FeatureVector, SlideMotion, Window
 from texture_features.correction import CORRECTED, Correction, read_correction
@@ -100,16 +101,23 @@ def entry_of(chosen: Any) -> dict[str, Any]:
 # Read the mapping in a recipe, or in the card of a model that was trained with one.
 
 
+def card_of(name_or_path: str, subfolder: str = 'config/recipes') -> Path | None:
+    """Return the card of a model, by NAME.npz, NAME.json or NAME; None for a recipe."""
+    stem = name_or_path.removesuffix('.npz').removesuffix('.json')
+    card = Path(f'{stem}.json').expanduser()
+    unknown = stem not in shipped('texture_estimation', subfolder, '.yaml')
+    return card if stem != name_or_path or (unknown and card.is_file()) else None
+
+
 def read_recipe(
     name_or_path: str, subfolder: str = 'config/recipes', kind: str = 'recipe'
 ) -> tuple[str, Mapping[str, Any]]:
     """Return name and content of a recipe (YAML) that texture_estimation ships, or of any file.
 
-    A model's card (JSON) holds its recipe under `recipe`; a model (.npz) has the card next to it.
+    A model's card (JSON) holds its recipe under `recipe`; a model, NAME.npz or NAME, has the card NAME.json next to it.
     """
-    path = find_file(name_or_path, 'texture_estimation', subfolder, kind)
-    if path.suffix == '.npz':
-        path = path.with_suffix('.json')
+    card = card_of(name_or_path, subfolder)
+    path = card if card and card.is_file() else find_file(name_or_path, 'texture_estimation', subfolder, kind)
     content = load_card(path) if path.suffix == '.json' else load_yaml(path, kind)
     if not isinstance(content, Mapping):
         raise InvalidParameter(f"{kind} '{path}' holds {safe_repr(content)}; a mapping with the key 'inputs' is needed")
@@ -198,16 +206,16 @@ class FeatureSet:
 
     @classmethod
     def load(cls, name_or_path: str) -> FeatureSet:
-        """Read the feature set of a recipe (YAML), or of a model's card (JSON) with the correction next to it.
+        """Read the feature set of a recipe (YAML), or of a model with the correction next to it; '' is 'default'.
 
         Raises
         ------
         UnknownName, InvalidParameter
             If there is no such file or it does not hold a feature set.
         """
-        _, recipe = read_recipe(name_or_path)
+        _, recipe = read_recipe(name_or_path or 'default')
         feature_set = cls.from_mapping(recipe, f"recipe '{name_or_path}'")
-        if not name_or_path.endswith(('.json', '.npz')):
+        if card_of(name_or_path or 'default') is None:
             return feature_set
         return dataclasses.replace(feature_set, correction=read_correction(name_or_path))
 

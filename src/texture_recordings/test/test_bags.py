@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import dataclasses
 import math
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -224,6 +225,34 @@ def test_a_recording_that_was_cut_off_is_read_up_to_its_last_chunk(tmp_path: Pat
     assert read == [100 * number for number in range(int(printed[-1]))]
     assert (len(read) == 100) == (most_bytes > 40_000)
     assert find_bags([tmp_path]) == [tmp_path / 'bag']
+
+
+@pytest.mark.parametrize('size', [0, 10, 500])
+@pytest.mark.parametrize('metadata', [True, False])
+def test_a_bag_that_was_cut_off_before_its_first_chunk_ended_is_refused(
+    tmp_path: Path, size: int, *, metadata: bool
+) -> None:
+    bag = write(tmp_path / 'bag')
+    os.truncate(bag / 'bag.mcap', size)
+    if not metadata:
+        (bag / 'metadata.yaml').unlink()
+    with pytest.raises(InvalidData, match='was cut off before its first part was complete'):
+        list(read_bag(bag))
+
+
+def test_a_bag_with_fewer_messages_than_it_declares_is_refused_until_its_metadata_is_removed(tmp_path: Path) -> None:
+    bag, file = tmp_path / 'bag', tmp_path / 'bag' / 'bag.mcap'
+    with BagWriter(bag) as writer:
+        for number in range(20):
+            writer.write('signal', signal(5 * number), STAMP_NS + number)
+            if number == 9:
+                writer.flush()
+                size = file.stat().st_size
+    os.truncate(file, size + 20)
+    with pytest.raises(InvalidData, match='10 of its messages are missing'):
+        list(read_bag(bag))
+    (bag / 'metadata.yaml').unlink()
+    assert len(list(read_bag(bag))) == 10
 
 
 def test_a_last_chunk_whose_content_never_reached_the_disk_is_left_out(tmp_path: Path) -> None:

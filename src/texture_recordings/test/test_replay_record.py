@@ -22,6 +22,7 @@ from texture_core.ros import SENSOR_QOS, STATE_QOS, to_msg
 from texture_core.ros_testing import LocalGraph, NodeProcess
 from texture_core.types import ExplorationState, Phase, TactileSignal
 from texture_recordings.bags import BagWriter, read_bag, read_foreign
+from texture_recordings.ros import TOPICS
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
@@ -60,7 +61,7 @@ def test_what_is_replayed_is_recorded_whole_and_in_order(tmp_path: Path) -> None
     source = write(tmp_path / 'source', lost=5)
     with node('record', 50, out=str(tmp_path / 'copy'), use_sim_time=True) as record:
         wait_for(tmp_path / 'copy')
-        with node('replay', 50, bag=str(source), rate=5.0, clock=True, use_sim_time=True) as replay:
+        with node('replay', 50, bag=str(source), rate=5.0, clock=True, listeners='record') as replay:
             assert replay.wait(60.0) == 0, replay.output
         assert record.stop(signal.SIGTERM) == 0, record.output
     assert 'published 200 exploration, 200 signal' in replay.output
@@ -83,7 +84,7 @@ def test_what_is_replayed_is_recorded_whole_and_in_order(tmp_path: Path) -> None
 
 def test_the_rate_and_the_chosen_slides_are_kept(tmp_path: Path) -> None:
     source = write(tmp_path / 'source')
-    with node('replay', 51, bag=str(source), rate=2.0, slides='2', subscribers=0, start_delay_s=0.0) as replay:
+    with node('replay', 51, bag=str(source), rate=2.0, slides='2', listeners='', start_delay_s=0.0) as replay:
         assert replay.wait(60.0) == 0, replay.output
     assert 'published 100 exploration, 100 signal: 1.0 s in 0.5 s' in replay.output
 
@@ -92,10 +93,22 @@ def test_a_bag_is_not_replayed_where_another_node_publishes_the_same(tmp_path: P
     source = write(tmp_path / 'source')
     with LocalGraph(100) as graph:
         graph.peer.create_publisher(msg.TactileSignal, '/left/signal', SENSOR_QOS)
-        with node('replay', 100, bag=str(source), subscribers=0, start_delay_s=30.0) as replay:
+        with node('replay', 100, bag=str(source), listeners='', start_delay_s=30.0) as replay:
             assert replay.wait(60.0) == 2, replay.output
     assert "another node publishes '/left/signal'" in replay.output
     assert f'`texture launch replay bag:={source} namespace:=replay`' in replay.output
+    assert 'published' not in replay.output
+
+
+def test_who_only_listens_does_not_start_a_replay(tmp_path: Path) -> None:
+    source = write(tmp_path / 'source')
+    with LocalGraph(100) as graph:
+        for topic in ('signal', 'exploration', 'features'):
+            graph.listen(TOPICS[topic].type, f'/left/{topic}', TOPICS[topic].qos)
+        with node('replay', 100, bag=str(source), deadline_s=3.0) as replay:
+            assert replay.wait(60.0) == 2, replay.output
+        found = graph.peer.get_name()
+    assert f"no node 'classifier' gets the samples or their features (waited 3 s; found: {found})" in replay.output
     assert 'published' not in replay.output
 
 
@@ -163,7 +176,11 @@ def test_beside_another_explorer_below_only_the_own_fingers_are_recorded(tmp_pat
     [
         ('replay', {}, "parameter 'bag' is ''"),
         ('replay', {'bag': 'nowhere'}, "there is no bag 'nowhere'"),
-        ('replay', {'bag': 'source', 'deadline_s': 0.2}, "nothing subscribes to 'signal' (waited 0.2 s)"),
+        (
+            'replay',
+            {'bag': 'source', 'deadline_s': 0.2},
+            "no node 'classifier' gets the samples or their features (waited 0.2 s; found: none)",
+        ),
         ('record', {}, "parameter 'out' is ''"),
         ('record', {'out': 'source'}, 'exists already'),
     ],

@@ -16,6 +16,6 @@ their signals and conditions. A robot that only records needs this package, `tex
 
 With ROS: `texture record my_bag`, `texture replay my_bag --rate 2`
 
-Limits: a damaged or foreign bag is refused with a sentence, one that was cut off is read up to its last whole chunk,
-and none is overwritten. Of foreign files the number of values is read from headers first, and limited.
+Limits: a damaged, truncated or foreign bag is refused with a sentence, that of a killed recorder is read up to its last
+whole chunk, and none is overwritten. Of foreign files the number of values is read from headers first, and limited.
 """

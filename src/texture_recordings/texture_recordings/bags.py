@@ -31,6 +31,7 @@ from texture_core.types import (
     DATA_CLASSES,
     NANOSECONDS,
     QUALITIES,
+    RESTARTED,
     Array,
     ExplorationRequest,
     ExplorationState,
@@ -86,7 +87,7 @@ MAX_MESSAGE_BYTES = 4 * MB  # of one of others, whose elements of a byte take 15
 SQLITE = b'SQLite format 3\0'
 # The tables and indices of a bag by SQLite: no views, no computed columns.
 PLAIN_SQL = re.compile(r'CREATE (TABLE|INDEX) \w+\s*(ON \w+\s*)?\([^()]*\)')
-CHUNK = 0x06
+MESSAGE, CHUNK = 0x05, 0x06
 CHUNK_CHECKSUM_AT = 33  # from the beginning of the record of a chunk
 CHUNK_HEAD = struct.Struct('<QQQI')  # start and end time, size of what it unpacks to, checksum
 RECORD_HEAD = struct.Struct('<BQ')
@@ -140,7 +141,11 @@ class CheckedPath(type(Path())):  # type: ignore[misc]
         end = _end_of_chunks(file)
         if whole:
             return file
-        logging.getLogger(__name__).warning("'%s' was cut off; it is read up to its last whole chunk", self)
+        if not end:
+            raise FileRefused(
+                'it was cut off before its first part was complete, so nothing of it can be read; record it again'
+            )
+        logging.getLogger(__name__).warning("'%s' was cut off; it has nothing behind its last whole chunk", self)
         return cast('IO[Any]', _Ended(file, end))
 
     def read_text(self, encoding: str | None = None, errors: str | None = None) -> str:
@@ -195,9 +200,12 @@ def _has_end(file: BinaryIO) -> bool:
 
 
 def _end_of_chunks(file: BinaryIO) -> int:
-    """Return where the last whole chunk of an MCAP file ends; power that fails may leave one of the right length."""
+    """Return where the last whole chunk of an MCAP file ends, 0 if none is whole and no message is outside of one.
+
+    Power that fails may leave a chunk of the right length.
+    """
     size = file.seek(0, io.SEEK_END)
-    chunks, unpacked = [], 0
+    chunks, unpacked, messages = [], 0, False
     at = end = len(MAGIC)
     while at + RECORD_HEAD.size <= size:
         file.seek(at)
@@ -209,11 +217,12 @@ def _end_of_chunks(file: BinaryIO) -> int:
             unpacked += int.from_bytes(file.read(CHUNK_HEAD.size)[16:24], 'little')
             _check_unpacked(unpacked, size)
             chunks.append((at - length, length))
+        messages |= kind == MESSAGE
         end = at
     while chunks and not _is_whole(file, *chunks[-1]):
         end = chunks.pop()[0] - RECORD_HEAD.size
     file.seek(0)
-    return end
+    return end if chunks or messages else 0
 
 
 def _is_whole(file: BinaryIO, at: int, length: int) -> bool:
@@ -544,7 +553,9 @@ def _read(
                 name = names.get(connection.topic, connection.topic)
                 yield name, RawMessage(connection.topic, connection.msgtype, log_ns, data)
             if missing and start_ns is None and stop_ns is None:
-                raise ReaderError(f'{missing} of its messages are missing')
+                raise FileRefused(
+                    f'{missing} of its messages are missing; record it again, or remove metadata.yaml and use the rest'
+                )
     except TextureError:
         raise
     except FileRefused as error:
@@ -608,7 +619,7 @@ class Continuity:
     def losses(self) -> str:
         """What was lost, in words, '' if nothing; losses in a restart, which numbers from 0, are unknown."""
         lost, restarts = self.lost.total(), self.restarts.total()
-        unknown = f'unknown losses in {restarts} restart{"s" if restarts > 1 else ""} of a driver or bridge'
+        unknown = f'unknown losses in {restarts} restart{"s" if restarts > 1 else ""} of {RESTARTED}'
         return ', and '.join(filter(None, (f'{lost} samples lost' if lost else '', unknown if restarts else '')))
 
     def update(self, stream: str, signal: TactileSignal) -> None:

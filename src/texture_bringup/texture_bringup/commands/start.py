@@ -70,7 +70,7 @@ def refuse_wrong(nodes: Sequence[NodeDescription], given: set[str]) -> None:
     """
     wanted: list[tuple[str, ...]] = []
     folders = set()
-    for node in nodes:
+    for node in sorted(nodes, key=lambda node: node.executable == 'feature_extractor'):  # its recipe may be the model's
         module, load, *names = LOOKED_AT.get(node.executable, ('', ''))
         known = {name: value for one in node.parameters if isinstance(one, Mapping) for name, value in one.items()}
         values = [str(known.get(name, '')) for name in names]

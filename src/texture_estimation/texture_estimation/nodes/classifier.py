@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -34,6 +33,9 @@ from texture_estimation.evidence import NO_MODEL, EvidenceAccumulator
 from texture_estimation.incremental import ChangeError, ChangeRefused, IncrementalClassifier
 from texture_estimation.model import TextureModel, load_model
 
+IN_PART = 'feature vectors were lost, and the estimate is of a part of the exploration; explore again'
+NO_ESTIMATE_PERIOD_S = 10.0  # of the warning that a model does not fit, or that slides are too short
+
 
 @dataclass(frozen=True)
 class EstimatorParams:
@@ -59,7 +61,9 @@ class EstimatorNode(Node):
         self._estimates = 0
         self._invalid = 0
         self._lost = 0
-        self._next_number: int | None = None
+        self._exploration_of_vectors: str | None = None  # None after the last one of an exploration
+        self._next_number = 0
+        self._in_part = False
         self._reported = 0
         self._processing_s = 0.0
         self._publisher = self.create_publisher(*self.estimate, ESTIMATE_QOS)
@@ -84,10 +88,12 @@ class EstimatorNode(Node):
 
     def _on_features(self, message: msg.FeatureVector) -> None:
         began = time.perf_counter()
-        # Vectors that did not come: their numbers run on, and start again with another extractor.
-        number, expected = message.sequence, self._next_number
-        if expected is not None:
-            self._lost += number - (expected if number >= expected else 0)
+        # Vectors that did not come: each exploration numbers its own from 0, as does an extractor that starts again.
+        begins = message.exploration_id != self._exploration_of_vectors
+        number, expected = message.sequence, 0 if begins else self._next_number
+        self._lost += number - (expected if number >= expected else 0)
+        self._in_part = number != expected or (self._in_part and not begins)
+        self._exploration_of_vectors = None if message.last else message.exploration_id
         self._next_number = number + 1
         try:
             vector = from_msg(message)
@@ -99,7 +105,10 @@ class EstimatorNode(Node):
         if estimate is None:
             return
         self._processing_s = time.perf_counter() - began
-        self._publisher.publish(to_msg(dataclasses.replace(estimate, processing_s=self._processing_s)))
+        if estimate.message and not estimate.windows and self._evidence.model:
+            self.get_logger().warning(estimate.message, throttle_duration_sec=NO_ESTIMATE_PERIOD_S)
+        said = '; '.join(filter(None, (IN_PART if self._in_part else '', estimate.message)))
+        self._publisher.publish(to_msg(replace(estimate, message=said, processing_s=self._processing_s)))
         self._estimates += 1
 
     def _change(self, params: EstimatorParams) -> None:

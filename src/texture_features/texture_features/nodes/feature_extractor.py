@@ -17,6 +17,7 @@ from texture_core.config import param
 from texture_core.errors import TextureError
 from texture_core.ros import (
     FEATURE_QOS,
+    LISTENERS,
     SENSOR_QOS,
     STATE_QOS,
     DiagnosticReport,
@@ -26,6 +27,7 @@ from texture_core.ros import (
     run,
     to_msg,
 )
+from texture_core.types import RESTARTED
 from texture_features.correction import CORRECTION, file_next_to
 from texture_features.feature_set import FeatureSet
 from texture_features.windows import WindowCutter, WindowEvent
@@ -39,7 +41,7 @@ class ExtractorParams:
 
     recipe: str = param(
         'default',
-        "Recipe: the name of a shipped one, or the path of a recipe (YAML) or of a model's card (JSON).",
+        "Recipe: the name of a shipped one, '' for 'default', or the path of a recipe (YAML) or of a model.",
     )
 
 
@@ -53,7 +55,8 @@ class FeatureExtractor(Node):
         if self._feature_set.correction is not None:
             self.get_logger().info(f"the finger is corrected by '{file_next_to(recipe, CORRECTION)}'")
         self._cutter = WindowCutter(self._feature_set.windows, self._feature_set.window_names)
-        self._invalid = self._sent = 0
+        self._invalid = 0
+        self._numbered = ('', 0)  # the exploration of the newest vector, and how many of it were sent
         self._reported: dict[str, int] = {}
         self._frame_id = ''  # of the fingertip, of several that of the first input
         self._tared: dict[str, bool] = {}  # by topic
@@ -95,12 +98,18 @@ class FeatureExtractor(Node):
             except TextureError as error:  # such as channels that the sensor does not have
                 self._count_invalid(error)
                 continue
-            vector.sequence = self._sent
+            exploration_id, sent = self._numbered
+            vector.sequence = sent if vector.exploration_id == exploration_id else 0
+            self._numbered = ('' if vector.last else vector.exploration_id, vector.sequence + 1)
             vector.header.frame_id = self._frame_id
             self._publisher.publish(vector)
-            self._sent += 1
 
     def _report(self) -> DiagnosticReport:
+        level, message, numbers = self._health()
+        found = self.get_subscriptions_info_by_topic(self._publisher.topic_name)
+        return level, message, {**numbers, LISTENERS: ' '.join(sorted({one.node_name for one in found}))}
+
+    def _health(self) -> tuple[str, str, dict[str, int]]:
         numbers = {**self._cutter.counts, 'invalid_messages': self._invalid}
         waiting = self._cutter.waiting_for
         if waiting:
@@ -113,7 +122,7 @@ class FeatureExtractor(Node):
             return 'WARN', '; '.join(tare_faults), numbers
         new, self._reported = {name: total - self._reported.get(name, 0) for name, total in numbers.items()}, numbers
         # After a restart, which numbers from 0, the number of lost samples is unknown.
-        unknown = 'unknown losses in a restart of a driver or bridge' if new['restarts'] else ''
+        unknown = f'unknown losses in a restart of {RESTARTED}' if new['restarts'] else ''
         lost = f'{new["lost_samples"]} samples lost' if new['lost_samples'] else ''
         if sentence := ', and '.join(filter(None, (lost, unknown))):
             return 'WARN', sentence, numbers

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.node import Node
@@ -20,7 +21,7 @@ from rosgraph_msgs.msg import Clock as ClockTime
 
 from texture_core.config import param
 from texture_core.errors import DeviceError, InvalidData, InvalidParameter, TextureError
-from texture_core.ros import declare, run, to_stamp
+from texture_core.ros import LISTENERS, declare, run, to_stamp
 from texture_core.types import NANOSECONDS
 from texture_recordings.bags import RawMessage, bags_in, read_named, short_name, topics_in
 from texture_recordings.ros import TOPICS
@@ -63,23 +64,24 @@ ACKNOWLEDGED_WITHIN = Duration(seconds=5)
 
 @dataclass(frozen=True)
 class ReplayParams:
-    """What is published, how fast, and the required subscribers."""
+    """What is published, how fast, and to which nodes."""
 
     bag: str = param('', 'Bag, or the folder of bags, that is published.')
     rate: float = param(1.0, 'Playback rate relative to the recording; 2 is twice as fast.', low=0.01, high=1000.0)
     slides: str = param('', "Which slides of each surface are published, such as '1-30'; '' takes the whole recording.")
     from_namespace: str = param('', "Namespace in the bag to publish; '' if it has but one.")
-    subscribers: int = param(
-        1, "Number of subscribers that 'signal', 'exploration' and 'features' need before the start.", low=0, high=100
+    listeners: str = param(
+        'classifier',
+        'Names of the nodes that must get the samples, or features of them, before the start, separated by spaces.',
     )
-    deadline_s: float = param(30.0, 'Time to wait for the subscribers.', unit='s', low=0.0)
+    deadline_s: float = param(60.0, 'Time to wait for these nodes.', unit='s', low=0.0)
     end_delay_s: float = param(
         0.0,
         'Time to wait after the last message, in which the last estimates come, before the node ends.',
         unit='s',
         low=0.0,
     )
-    start_delay_s: float = param(1.0, 'Time between finding the subscribers and the start.', unit='s', low=0.0)
+    start_delay_s: float = param(1.0, 'Time between finding these nodes and the start.', unit='s', low=0.0)
     clock: bool = param(
         False, "Publishes the time of the recording on '/clock', for nodes whose parameter 'use_sim_time' is true."
     )
@@ -98,6 +100,8 @@ class ReplayNode(Node):
         self._outputs = {name: self.create_publisher(t.type, name, t.qos) for name, t in topics.items()}
         self._clock_time = self.create_publisher(ClockTime, '/clock', 10) if self._params.clock else None
         self._counts: Counter[str] = Counter()
+        self._listeners: dict[str, list[str]] = {}  # of a feature extractor, as it reports
+        self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 100)
         self._stop = threading.Event()
         self.error: TextureError | None = None  # which ended the player
         self._player = threading.Thread(target=self._play, name='player')
@@ -132,7 +136,7 @@ class ReplayNode(Node):
 
     def _play(self) -> None:
         try:
-            self._wait_for_subscribers()
+            self._wait_for_listeners()
             self._refuse_others()
             self._begin_clock()
             self._wait_alone()
@@ -140,17 +144,39 @@ class ReplayNode(Node):
         except TextureError as error:
             self.error = error
 
-    def _wait_for_subscribers(self) -> None:
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            names = {value.key: value.value for value in status.values}.get(LISTENERS, '')
+            self._listeners[status.name] = names.split()
+
+    def _reached(self) -> set[str]:
+        """Return the names of the nodes that get the samples, and of those that get the features of these."""
+        found = {name: self._subscribed(name) for name in self._outputs}
+        # Of several fingers the live graph may use one.
+        samples = set().union(*(nodes for name, nodes in found.items() if short_name(name) != 'exploration'))
+        direct = samples & found['exploration']
+        names = {node.rpartition('/')[2] for node in direct}
+        return names.union(*(self._listeners.get(node, ()) for node in direct))
+
+    def _subscribed(self, name: str) -> set[str]:
+        """Return the full names of the nodes that subscribe to an output."""
+        found = self.get_subscriptions_info_by_topic(self._outputs[name].topic_name)
+        return {f'{one.node_namespace.rstrip("/")}/{one.node_name}' for one in found}
+
+    def _wait_for_listeners(self) -> None:
+        """Wait for the nodes by their names: a recorder that listens as well is none of them."""
         deadline = time.monotonic() + self._params.deadline_s
+        wanted = self._params.listeners.split()
         while not self._stop.wait(POLL_S):
-            missing = [name for name, count in self._listeners().items() if count < self._params.subscribers]
-            if not missing:
+            reached = self._reached()
+            if not (missing := [name for name in wanted if name not in reached]):
                 break
             if time.monotonic() > deadline:
                 raise DeviceError(
-                    f"nothing subscribes to '{missing[0]}' (waited {self._params.deadline_s:g} s); "
-                    f'`texture launch replay bag:={self._params.bag}` also starts the subscribers, and --namespace '
-                    'names nodes that run elsewhere'
+                    f"nothing is played, as no node '{missing[0]}' gets the samples or their features (waited "
+                    f'{self._params.deadline_s:g} s; found: {", ".join(sorted(reached)) or "none"}); '
+                    f'`texture launch replay bag:={self._params.bag}` also starts these nodes, --namespace names '
+                    'nodes that run elsewhere, and --listeners others'
                 )
 
     def _wait_alone(self) -> None:
@@ -179,13 +205,6 @@ class ReplayNode(Node):
     def _publish_time(self, time_ns: int) -> None:
         if self._clock_time is not None:
             self._clock_time.publish(ClockTime(clock=to_stamp(time_ns)))
-
-    def _listeners(self) -> dict[str, int]:
-        """Return how many subscriptions there are; those of `features` show that a classifier is also ready."""
-        counts = {name: output.get_subscription_count() for name, output in self._outputs.items()}
-        # Of several fingers the live graph may use one.
-        signal = max(count for name, count in counts.items() if short_name(name) != 'exploration')
-        return {'signal': signal, 'exploration': counts['exploration'], 'features': self.count_subscribers('features')}
 
     def _publish_all(self) -> None:
         schedule = Schedule(self._params.rate)
