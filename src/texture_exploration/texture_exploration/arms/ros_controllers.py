@@ -69,7 +69,7 @@ GONE_NS = 300_000_000  # a controller that is not seen for this long is lost; a 
 UNSEEN_NS = 100_000_000  # without a pose, after which it is not known whether the arm follows
 POLL_S = 0.005
 LOGGER = logging.getLogger(__name__)
-NOT_FOUND = '; check this name, that its node runs, ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE'
+NOT_FOUND = '; check the name, that its node runs, ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE'
 NOT_CONNECTED = 'the arm is not connected; connect it first'
 DEFAULTS = RosControllersParams()
 
@@ -304,7 +304,7 @@ class RosControllersArm(SurfaceArm):
                 self._state = tool.state('')
                 return
             if tool.misplaced or time.monotonic() > end_s:
-                raise DeviceError(tool.misplaced or f'{", ".join(faults)}{NOT_FOUND}')
+                raise DeviceError(tool.misplaced or f'{"; ".join(faults)}{NOT_FOUND}')
             time.sleep(POLL_S)
 
     def _take(self, topics: ControllerTopics, now_ns: int) -> None:
