@@ -218,7 +218,7 @@ def test_a_limited_confidence_keeps_the_order_of_the_labels_and_the_sum_of_the_p
         (44, {}, '44 slides could be held out; to accept a label 45 are needed, and 5 of each surface'),
         (60, {'cork': 56, 'felt': 4}, "60 slides could be held out, and 4 of 'felt'"),
         (45, {'cork': 40, 'felt': 5}, ''),
-        (0, {'cork': 40, 'felt': 5}, '0 slides could be held out (none in an adaptation to today; train instead'),
+        (0, {'cork': 40, 'felt': 5}, '0 slides could be held out (none in an adaptation to today, and by recipes'),
     ],
 )  # fmt: skip
 def test_the_reason_names_the_slides_that_there_are_and_those_that_are_needed(slides, of_labels, sentence):

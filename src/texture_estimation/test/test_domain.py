@@ -105,6 +105,8 @@ def test_a_slide_that_adds_less_power_than_the_sensor_has_at_rest_is_outside_whe
     assert domain.deviation(at_level(15.6)) == ''
     assert trained_on(noise, at_level(30.0)).rest == {'signal/pac': 10.0}  # of the slides that show it
     assert trained_on(at_level(10.0)).deviation(at_level(10.0)) == ''
+    other = (('signal/pac', 10.0), ('signal/new', 9.0))  # as after a change of the names of the channels
+    assert trained_on(noise, at_level(30.0, rest=other)).rest == {'signal/pac': 10.0, 'signal/new': 9.0}
     # A channel that is louder, or of which the level is no feature, may show the touch.
     both = trained_on(at_level(10.0, rest=(('signal/pac', 10.0), ('signal/pdc', 1.0))))
     assert both.deviation(at_level(10.0)) == ''

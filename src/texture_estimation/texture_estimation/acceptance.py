@@ -334,7 +334,7 @@ class Acceptance:
         if not short and self.slides >= needed:
             return ''
         fewest = f", and {min(short.values())} of '{min(short, key=lambda label: short[label])}'" if short else ''
-        none = '' if self.slides else ' (none in an adaptation to today; train instead)'
+        none = '' if self.slides else ' (none in an adaptation to today, and by recipes that are not calibrated)'
         return (
             f'too little training: {self.slides} slides could be held out{none}{fewest}; to accept a label '
             f'{needed:g} are needed, and {LEAST_SLIDES_A_LABEL} of each surface'

@@ -195,8 +195,11 @@ def _levels(slides: Sequence[SlideConditions]) -> dict[str, Interval]:
 
 def _rest(slides: Sequence[SlideConditions]) -> dict[str, float]:
     """Return the median level of each channel before the touch, of the slides that show it."""
-    shown = [dict(slide.rest) for slide in slides if slide.rest]
-    return {name: float(np.median([rest[name] for rest in shown])) for name in shown[0]} if shown else {}
+    by_channel: defaultdict[str, list[float]] = defaultdict(list)
+    for slide in slides:
+        for channel, level in slide.rest:
+            by_channel[channel].append(level)
+    return {channel: float(np.median(levels)) for channel, levels in by_channel.items()}
 
 
 def _names(names: Iterable[str]) -> tuple[str, ...]:

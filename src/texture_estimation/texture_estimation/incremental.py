@@ -61,6 +61,7 @@ class IncrementalClassifier:
 
     def begin(self, exploration_id: str) -> None:
         """Note an exploration as the newest one: if it ends before it slides, no earlier one takes its place."""
+        self._sliding = None
         self._recent_windows_of(exploration_id)
 
     def observe(self, vector: FeatureVector) -> None:

@@ -117,7 +117,7 @@ def read_recipe(
     A model's card (JSON) holds its recipe under `recipe`; a model, NAME.npz or NAME, has the card NAME.json next to it.
     """
     card = card_of(name_or_path, subfolder)
-    path = card if card and card.is_file() else find_file(name_or_path, 'texture_estimation', subfolder, kind)
+    path = card or find_file(name_or_path, 'texture_estimation', subfolder, kind)
     content = load_card(path) if path.suffix == '.json' else load_yaml(path, kind)
     if not isinstance(content, Mapping):
         raise InvalidParameter(f"{kind} '{path}' holds {safe_repr(content)}; a mapping with the key 'inputs' is needed")

@@ -9,7 +9,9 @@ import pytest
 
 from texture_core.errors import ExplorationError, InvalidData
 from texture_core.types import NANOSECONDS, ExplorationState, Phase, TactileSignal
+from texture_features.feature_set import FeatureSet
 from texture_recordings.bags import BagWriter, Continuity
+from texture_recordings.dataset import SlideDataset
 from texture_recordings.nodes.replay import Schedule
 from texture_recordings.slides import STREAMS, LabelledSlide, find_slides, parse_selection, with_places
 
@@ -150,3 +152,21 @@ def test_slides_that_touched_at_several_places_of_a_surface_know_theirs():
     found = with_places([slide(name, number, x_m) for number, (name, x_m) in enumerate(touched)])
     assert [one.place for one in found] == ['at 10,1 mm', 'at 10,1 mm', 'at -30,1 mm', '', '', '']
     assert (found[0].name, found[0].is_part) == ('oak/0', False)
+
+
+@pytest.mark.parametrize('bad', [False, True])
+def test_the_level_at_rest_is_that_of_windows_without_samples_that_are_not_finite(bad: bool) -> None:
+    # Noise of 10 on a level that settles by 100 in 2 s, whose deviation over all 2 s is 28.
+    rng = np.random.default_rng(0)
+    rest = rng.normal(scale=10.0, size=(2000, 1)) + 100.0 * np.exp(-np.arange(2000) / 500.0)[:, None]
+    rest[5] = np.nan if bad else rest[5]
+    recipe = FeatureSet.load('default')
+    [slid] = SlideDataset.from_arrays({'signal': [rng.normal(scale=50.0, size=(1500, 1))]}, ['oak'], {'signal': 1000.0})
+    [first, *more] = slid.signals['signal']
+    assert not more
+    before = replace(first, stamp_ns=first.stamp_ns - 2 * NANOSECONDS, first_sample=0, samples=rest)
+    approach = ExplorationState(before.stamp_ns, slid.exploration_id, 'linear_slide', Phase.APPROACH)
+    signals = {'signal': [before, replace(first, first_sample=2000)]}
+    whole = SlideDataset((replace(slid, signals=signals, states=(approach, *slid.states)),))
+    [(_, level)] = whole.features(recipe).conditions[slid.name].rest
+    assert level == pytest.approx(11.0, abs=1.5)

@@ -422,7 +422,7 @@ class SlideDataset:
         motions = {slide.name: slide.motion for slide in self.slides if slide.motion}
         conditions = dict(features.conditions)
         for slide in (one for one in self.slides if one.name in conditions):
-            made, rest = conditions[slide.name], _rest_levels(slide, feature_set.topics)
+            made, rest = conditions[slide.name], _rest_levels(slide, feature_set)
             conditions[slide.name] = replace(made, session=slide.session, place=slide.place, rest=rest)
         return replace(
             features,
@@ -524,13 +524,24 @@ def _described(slide: LabelledSlide, feature_set: FeatureSet, events: Sequence[W
     return [replace(vector, exploration_id=slide.name) for vector in vectors]
 
 
-def _rest_levels(slide: LabelledSlide, topics: Sequence[str]) -> tuple[tuple[str, float], ...]:
-    """Return the standard deviation of each channel before the touch; () where too little of it was recorded."""
-    rests = {topic: slide.at_rest(topic) for topic in topics}
-    if min(map(len, rests.values())) < LEAST_AT_REST:
-        return ()
-    names = (f'{topic}/{channel}' for topic in topics for channel in slide.signals[topic][0].channels)
-    return tuple(zip(names, np.concatenate([rest.std(axis=0) for rest in rests.values()]).tolist(), strict=True))
+def _rest_levels(slide: LabelledSlide, feature_set: FeatureSet) -> tuple[tuple[str, float], ...]:
+    """Return the level of each channel before the touch; () where too little of it was recorded.
+
+    It is the median of stretches as long as a window: over more of it a level that settles would count as noise.
+    """
+    found: dict[str, float] = {}
+    for topic in feature_set.topics:
+        rest, like = slide.at_rest(topic), slide.signals[topic][0]
+        length = min(len(rest), round(feature_set.windows.length_s * like.sampling_rate_hz))
+        if length < LEAST_AT_REST:
+            return ()
+        levels = rest[: len(rest) // length * length].reshape(-1, length, rest.shape[1]).std(axis=1)
+        levels = levels[np.isfinite(levels).all(axis=1)]
+        if not len(levels):
+            return ()
+        names = (f'{topic}/{channel}' for channel in like.channels)
+        found |= zip(names, np.median(levels, axis=0).tolist(), strict=True)
+    return tuple(found.items())
 
 
 def no_window(dataset: SlideDataset, feature_set: FeatureSet) -> InvalidData:

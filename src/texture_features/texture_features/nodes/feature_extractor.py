@@ -56,7 +56,8 @@ class FeatureExtractor(Node):
             self.get_logger().info(f"the finger is corrected by '{file_next_to(recipe, CORRECTION)}'")
         self._cutter = WindowCutter(self._feature_set.windows, self._feature_set.window_names)
         self._invalid = 0
-        self._numbered = ('', 0)  # the exploration of the newest vector, and how many of it were sent
+        # The exploration of the newest vector, and how many of it were sent.
+        self._numbered: tuple[str | None, int] = (None, 0)
         self._reported: dict[str, int] = {}
         self._frame_id = ''  # of the fingertip, of several that of the first input
         self._tared: dict[str, bool] = {}  # by topic
@@ -100,7 +101,7 @@ class FeatureExtractor(Node):
                 continue
             exploration_id, sent = self._numbered
             vector.sequence = sent if vector.exploration_id == exploration_id else 0
-            self._numbered = ('' if vector.last else vector.exploration_id, vector.sequence + 1)
+            self._numbered = (None if vector.last else vector.exploration_id, vector.sequence + 1)
             vector.header.frame_id = self._frame_id
             self._publisher.publish(vector)
 
