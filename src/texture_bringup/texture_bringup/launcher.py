@@ -621,12 +621,19 @@ class _Reader:
     def _read_include(self, element: Element) -> None:
         path = Path(self.text(element, 'file'))
         given = {self.text(item, 'name'): self.text(item, 'value') for item in element}
+
+        def check(declared: Collection[str]) -> None:
+            for name in given:
+                if name not in declared:
+                    raise unknown_name(name, declared, f'argument of {path.name}')
+
+        root = _root(path)
+        if next(root.iter('include'), None) is None:  # before an argument that is missing instead is named
+            check(_declared(root))
         others, self.declared = self.declared, set()
         self._variables.update(given)
         self.read_file(path)
-        for name in given:
-            if name not in self.declared:  # neither by this file nor by one that it includes
-                raise unknown_name(name, self.declared, f'argument of {path.name}')
+        check(self.declared)  # by this file or by one that it includes
         self.declared |= others
 
     def _read_node(self, element: Element) -> None:
@@ -634,7 +641,11 @@ class _Reader:
         if (on_exit := texts.get('on_exit', 'shutdown')) != 'shutdown':
             raise InvalidLaunch(f"'on_exit' of <node> is '{on_exit}'; allowed is shutdown")
         namespace = joined_namespace(self._namespace, texts.get('namespace', ''))
-        owner = f'{namespace.rstrip("/")}/{texts.get("name", EXPLORER)}' if texts.get('exec') == EXPLORER else ''
+        owner = (
+            f'{namespace.rstrip("/")}/{texts.get("name", EXPLORER)}'
+            if (texts.get('pkg'), texts.get('exec')) == ('texture_exploration', EXPLORER)
+            else ''
+        )
         types = ('bool', 'float', 'int')
         respawn, delay_s, retries = (
             typed(texts.get(name, usual), kind, f"'{name}' of <node>")

@@ -509,7 +509,14 @@ class Operator:
         silent = 'the explorer has not answered yet; stop it, and check that no second one runs'
         while not accepted.done():
             self.wait_until(lambda: accepted.done() or connects(), ACCEPT_S, silent, MotionAborted)
-            self.wait_until(lambda: accepted.done() or not connects(), ANSWER_S, self._info.message, MotionAborted)
+            self.wait_until(
+                lambda: accepted.done() or not connects() or not self._explore.server_is_ready(),
+                ANSWER_S,
+                self._info.message,
+                MotionAborted,
+            )
+            if connects() and not accepted.done():
+                raise MotionAborted(VANISHED)
 
     def _on_info(self, take: Callable[[Any], None]) -> None:
         """Subscribe to what the explorer can do, which is latched."""

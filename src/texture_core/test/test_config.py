@@ -183,6 +183,18 @@ def test_a_key_that_is_there_twice_is_named_with_its_lines(tmp_path: Path) -> No
         load_yaml(tmp_path / 'file.yaml', 'mapping')
 
 
+@pytest.mark.parametrize(
+    'text', ['{1: a, 1.0: b}', '{1: a, true: b}', "{1: a, '1': b}", '{0: a, no: b}', '{~: a, null: b}']
+)
+def test_two_forms_of_one_key_are_refused(text: str) -> None:
+    with pytest.raises(ValueError, match='write it once'):
+        parse_yaml(text)
+
+
+def test_an_empty_key_and_a_text_are_two_keys() -> None:
+    assert parse_yaml('{null: a, "None": b}') == {None: 'a', 'None': 'b'}
+
+
 @pytest.mark.parametrize('text', ['[' * 100_000, '{"recipe"', '[]', '3', '"x"', '\x00'])
 def test_a_bad_card_is_refused(text: str, tmp_path: Path) -> None:
     (tmp_path / 'card.json').write_text(text)

@@ -145,7 +145,13 @@ def test_a_file_with_a_wrong_layout_is_refused_in_one_sentence(tmp_path: Path, c
         check_parameter_file(Path(words[1]))
 
 
-@pytest.mark.parametrize('section', ['/**/nn', 'n', '/q/n', '/*/n'])
+@pytest.mark.parametrize('section', ['/**', '/**/n', '/*/n', '/left/**', '/**/left/n', 'left/n', '/left/n', '/*/*'])
+def test_a_section_that_reaches_the_node_as_ros_matches_names_is_allowed(tmp_path: Path, section: str) -> None:
+    words = write(tmp_path / 'robot.yaml', f'{section}:\n  ros__parameters: {{length_s: 3.0}}\n')
+    check_parameter_file(Path(words[1]), '/left/n')
+
+
+@pytest.mark.parametrize('section', ['/**/nn', 'n', '/q/n', '/*/*/n', '/p/*/n', '/p/n/**/m'])
 def test_a_node_that_owns_its_file_refuses_a_section_that_does_not_reach_it(
     tmp_path: Path, capfd: Any, section: str
 ) -> None:

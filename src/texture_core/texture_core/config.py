@@ -415,8 +415,13 @@ def check_parameter_file(path: Path, node: str = '') -> None:
     except InvalidParameter as error:
         raise InvalidParameter(f'{" ".join(str(error).split())}; {PARAMETER_FILE}') from error
     allowed = ('/**', f'/**/{node.rpartition("/")[2]}', node)
+
+    def reaches(section: str) -> bool:  # as ROS matches: * is one name, ** any number of them
+        form = re.escape(section).replace(r'/\*\*', '(/[^/]+)*').replace(r'\*', '[^/]+')
+        return bool(re.fullmatch(form, node))
+
     for section in sections({} if content is None else {'': content}):
-        if node and section not in allowed:
+        if node and not reaches(section):
             raise InvalidParameter(
                 f"parameter file '{path}' has the section '{section}', which is not for node '{node}'; "
                 f'allowed are {", ".join(allowed)}: correct its name, or remove it'
@@ -443,12 +448,13 @@ class _PlainLoader(yaml.SafeLoader):
         return super().compose_node(parent, index)
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        lines: dict[str, int] = {}
-        for key, _ in node.value:
-            name, line = str(self.construct_object(key, deep=True)), key.start_mark.line + 1  # 1 and '1' are one name
-            if name in lines:
-                raise ValueError(f"the key '{name}' is in line {lines[name]} and again in line {line}; write it once")
-            lines[name] = line
+        lines: dict[Any, int] = {}
+        for node_of_key, _ in node.value:
+            key, line = self.construct_object(node_of_key, deep=True), node_of_key.start_mark.line + 1
+            forms = {key, str(key)} if isinstance(key, (str, int, float)) else {(repr(key),)}  # 1, 1.0 and '1' are one
+            for form in forms & set(lines):
+                raise ValueError(f"the key '{key}' is in line {lines[form]} and again in line {line}; write it once")
+            lines |= dict.fromkeys(forms, line)
         return super().construct_mapping(node, deep=deep)
 
 

@@ -49,7 +49,7 @@ class CommandRefused(DeviceError):
 class ExplorationError(enum.IntEnum):
     """Why an exploration is no success: `error_code` of the message ExplorationResult, which describes each value.
 
-    From 10 on it was refused and nothing has moved; from 20 on it was aborted.
+    From 10 on it was refused and nothing has moved; from 20 on it was aborted, with NO_SIGNAL also before it moved.
     """
 
     NONE = 0

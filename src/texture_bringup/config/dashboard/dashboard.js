@@ -33,7 +33,7 @@ const showBanner = () => {
   at('banner').hidden = !text;
 };
 const say = (text, bad = false) => {
-  answer = [text, bad];
+  answer = [text ?? '', bad];
   showBanner();
 };
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name);
@@ -383,7 +383,11 @@ function connect() {
 function showLost() {
   live = false;
   showBanner();
+  window.clearInterval(replaying);
+  replaying = null;
   showState({ phase: 'not connected' });
+  ['label', 'grade'].forEach((id) => { at(id).textContent = '–'; });
+  at('estimate-note').textContent = '';
   at('phase').className = 'phase aborted';
   fill(at('lights'), [], element);
 }

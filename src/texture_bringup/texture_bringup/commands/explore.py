@@ -36,6 +36,7 @@ from texture_core.errors import (
     LaunchFailed,
     MotionAborted,
     MotionRefused,
+    TextureError,
 )
 from texture_core.types import ExplorationRequest, ExplorationState, TextureEstimate
 from texture_exploration.motions import MOTIONS
@@ -314,7 +315,10 @@ def collect_surface(
     plan = collection.PlacePlan(surface, params, patch, (low_n, high_n), (LEAST_SPEED_M_S, high_m_s))
     folder.mkdir(parents=True, exist_ok=True)
     if any(map(is_bag, folder.iterdir())):
-        _features_of(folder)  # refused before the robot moves
+        try:
+            _features_of(folder)  # what cannot be used is refused before the robot moves
+        except TextureError as error:
+            raise InvalidData(f"{error}; or move that bag out of '{folder}'") from error
     bag = folder / collection.next_bag([one.name for one in folder.iterdir()], surface)
     made, losses = 0, ''
     end = collection.CollectionEnd(CollectionError.CANCELLED, 'stopped', 0)  # by Ctrl-C while the recorder starts
@@ -559,7 +563,7 @@ def plate_request(options: argparse.Namespace, stored: Mapping[str, float]) -> E
     for option, (field, unit, _, usual) in PLATE_NUMBERS.items():
         given, in_si = getattr(options, option), math.radians(1.0) if option == 'direction' else 1.0
         numbers[field] = stored.get(field, usual) if given is None else given * in_si
-        if not math.isclose(numbers[field], made := stored.get(field, numbers[field])):
+        if not math.isclose(numbers[field], made := stored.get(field, numbers[field]), rel_tol=1e-3):
             raise InvalidParameter(
                 f'--{option} is {given:g} {unit}, and the reference was made with {made / in_si:g} {unit}; leave it '
                 'out, or store a reference with it by --store'
