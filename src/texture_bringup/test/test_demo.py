@@ -170,21 +170,20 @@ def test_it_accepts_trained_surfaces_and_rejects_others_and_leaves_a_picture(tmp
     assert re.search(r'texture: +leather, confidence', explored.stdout), explored
 
 
-def test_the_lines_for_the_user_name_recipe_and_page_only_where_they_are_not_the_default() -> None:
-    usual, explore = by_hand(Path('my out'), 'default', 0)
+def test_the_lines_for_the_user_name_the_page_only_where_it_was_asked_for() -> None:
+    usual, explore = by_hand(Path('my out'), 0)
     assert "'model:=my out/model.npz'" in usual
-    assert 'recipe:=' not in usual
     assert 'dashboard' not in usual
     assert '--namespace demo' in explore
     nodes = read(find_launch_file('emulator'), given_arguments(shlex.split(usual)[3:]), os.environ)
     assert {node.namespace for node in nodes} == {'/demo'}
-    other, _ = by_hand(Path('out'), 'vibration', 8123)
+    other, _ = by_hand(Path('out'), 8123)
     nodes = read(find_launch_file('emulator'), given_arguments(shlex.split(other)[3:]), os.environ)
     given = {
         node.name: {k: v for one in node.parameters if isinstance(one, dict) for k, v in one.items()} for node in nodes
     }
     assert given['dashboard']['port'] == 8123
-    assert given['feature_extractor']['recipe'] == 'out/model.json'
+    assert given['feature_extractor']['recipe'] == given['classifier']['model'] == 'out/model.npz'
 
 
 @pytest.mark.ros

@@ -86,11 +86,9 @@ def test_a_second_emulator_is_refused_before_a_bag_is_made(capsys, tmp_path) -> 
 
 
 def test_of_two_emulators_that_start_at_once_the_second_starts_no_node(capsys, tmp_path) -> None:
-    claim(tmp_path)
+    claim(tmp_path / 'finger')
     said = refused(['launch', 'emulator', f'devices:={tmp_path}'], capsys)
-    assert said == (
-        f"texture: another launch has the emulated devices in '{tmp_path}'; end it, or give this one a namespace\n"
-    )
+    assert f"another launch has the emulator at '{tmp_path}/finger'; end it, or give this one another namespace" in said
 
 
 def test_the_models_are_good_and_the_figures_are_written(data, capsys, tmp_path) -> None:

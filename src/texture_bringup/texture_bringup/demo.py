@@ -215,7 +215,7 @@ def demonstrate(out: Path, recipe: str, seed: int, *, dashboard: bool = False) -
     section(f'Done: {right} of {len(slides)} results as expected. Look at {out / PICTURE}')
     line(f'training slides, models and the log of the nodes are in {out}/')
     line('by hand, in one terminal and, once it prints `the sensor delivers samples`, in another:')
-    for command in by_hand(out, recipe, port):
+    for command in by_hand(out, port):
         line(f'    {command}')
     if dashboard:
         line(f'the first of them serves the dashboard at {address} again')
@@ -289,13 +289,11 @@ def slide_over(operator: Operator, request: ExplorationRequest, title: str, expe
     return made
 
 
-def by_hand(out: Path, recipe: str, dashboard_port: int) -> tuple[str, str]:
+def by_hand(out: Path, dashboard_port: int) -> tuple[str, str]:
     """Return the commands with which a user explores with the model of the demonstration, beside other emulators."""
-    # As it can be typed in this folder; elsewhere, after a build with colcon, the command is on the path.
-    texture = '.venv/bin/texture' if Path('.venv/bin/texture').exists() else 'texture'
+    program = Path(shutil.which('texture') or 'texture')
+    texture = str(program.relative_to(Path.cwd()) if program.is_relative_to(Path.cwd()) else program)
     arguments = ['namespace:=demo', 'surface:=leather', f'model:={out / MODEL}.npz']
-    if recipe != 'default':
-        arguments.append(f'recipe:={out / MODEL}.json')
     if dashboard_port:
         arguments += ['dashboard:=true', f'dashboard_port:={dashboard_port}']
     motion = ['linear_slide', '--namespace', 'demo', '--speed', f'{SPEED_M_S:g}', '--distance', f'{DISTANCE_M:g}']

@@ -69,14 +69,14 @@ def refuse_wrong(nodes: Sequence[NodeDescription], given: set[str]) -> None:
     In a separate process: a launcher that stays needs none of their libraries.
     """
     wanted: list[tuple[str, ...]] = []
-    folders = set()
+    pipes = set()
     for node in sorted(nodes, key=lambda node: node.executable == 'feature_extractor'):  # its recipe may be the model's
         module, load, *names = LOOKED_AT.get(node.executable, ('', ''))
         known = {name: value for one in node.parameters if isinstance(one, Mapping) for name, value in one.items()}
         values = [str(known.get(name, '')) for name in names]
         if node.executable == 'emulator' and 'finger_pipe' in known:  # one uses it; else a recorder has made its bag
             wanted.append(('texture_core.types', 'FingerReceiver', str(known['finger_pipe'])))
-            folders.add(Path(str(known['finger_pipe'])).expanduser().parent)
+            pipes.add(Path(str(known['finger_pipe'])).expanduser())
         if all(values) and given.intersection(values):
             wanted.append((module, load, *values))
     if wanted:
@@ -85,17 +85,18 @@ def refuse_wrong(nodes: Sequence[NodeDescription], given: set[str]) -> None:
             with task('checking the files that the launch names'):  # behind the fork, which copies no thread
                 for check in checks:
                     check.result()
-    for folder in folders:
-        claim(folder)
+    for pipe in pipes:
+        claim(pipe)
 
 
-def claim(folder: Path) -> None:
-    """Hold the folder of emulated devices until this process ends: the sensor of a second launch would read them."""
+def claim(pipe: Path) -> None:
+    """Hold the pipe of an emulator until this process ends: the sensor of a second launch would read its devices."""
+    pipe.parent.mkdir(parents=True, exist_ok=True)
     try:
-        fcntl.flock(os.open(folder, os.O_RDONLY), fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(os.open(f'{pipe}.lock', os.O_RDWR | os.O_CREAT, 0o600), fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:
         raise LaunchFailed(
-            f"another launch has the emulated devices in '{folder}'; end it, or give this one a namespace"
+            f"another launch has the emulator at '{pipe}'; end it, or give this one another namespace"
         ) from error
 
 
