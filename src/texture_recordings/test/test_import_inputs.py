@@ -1014,7 +1014,7 @@ def test_a_row_that_is_malformed_in_two_streams_counts_once(tmp_path: Path, also
     streams = {name: {'columns': [column], 'time': time, 'rate_hz': 100.0}
                for name, column in (('signal', 'x'), ('signal_static', 'y'))}  # fmt: skip
     if refused:
-        with pytest.raises(InvalidData, match='it has 61 malformed rows of 600'):
+        with pytest.raises(InvalidData, match='has 61 malformed rows of 600'):
             run(tmp_path, streams=streams)
     else:
         assert run(tmp_path, streams=streams).slides == {'cork': 1}
