@@ -119,11 +119,13 @@ def test_the_command_plays_a_bag_to_the_nodes_that_it_names(tmp_path: Path) -> N
     script = f'import sys; from texture_recordings.commands.play import replay; parser = Parser(); {run}'
     options = ['--slides', '2', '--rate', '2', '--namespace', 'left', '--listeners', 'peer']
     with LocalGraph(100) as graph:
-        received = graph.listen(TOPICS['signal'].type, '/left/signal', TOPICS['signal'].qos)
+        received, _ = (
+            graph.listen(TOPICS[name].type, f'/left/{name}', TOPICS[name].qos) for name in ('signal', 'exploration')
+        )
         command = [sys.executable, '-c', f'from texture_core.cli import Parser; {script}', str(write(tmp_path / 'bag'))]
         played = subprocess.run([*command, *options], check=False, capture_output=True, text=True)
+        assert played.returncode == 0, played.stderr
         graph.until(lambda: received)
-    assert played.returncode == 0, played.stderr
     assert 'published 100 exploration, 100 signal' in played.stdout + played.stderr
 
 
