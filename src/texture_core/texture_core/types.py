@@ -226,7 +226,7 @@ class Window:
 
 
 # What sends samples that are numbered from 0 again.
-RESTARTED = 'a driver or bridge, or none where a replay went on to its next bag'
+RESTARTED = 'a driver or bridge (none if a replay went on to its next bag)'
 
 # --------------------
 # The features of one window of sliding.

@@ -103,10 +103,23 @@ def test_a_slide_in_which_the_arm_paused_is_refused_and_gives_no_verdict(trained
     store_reference(model, TOPICS, slides[:2])
     assert check(model, paused(slides[2], 0, name))[0]
     for slide in (paused(slides[2], 1, name), louder(paused(slides[2], 1, name), 2.0)):
-        with pytest.raises(InvalidData, match=r'the arm paused for 200 ms in the slide .*\(100 ms are .*, and repeat$'):
+        with pytest.raises(InvalidData, match=r'the arm paused for 200 ms .*\(100 ms .*\(10 Hz; above .*, and repeat$'):
             check(model, slide)
     with pytest.raises(InvalidData, match='the arm paused'):
         store_reference(model, TOPICS, [slides[0], paused(slides[1], 1, name)])
+
+
+def test_a_slow_pose_is_named_and_an_arm_that_begins_late_did_not_pause(trained):
+    model, slides = trained
+    store_reference(model, TOPICS, slides[:2])
+    moved = [replace(one, x_m=1e-3 * max(number, 2), y_m=0.0) for number, one in enumerate(slides[2].sliding)]
+    assert check(model, replace(slides[2], states=moved))[0]
+    first_ns = moved[0].stamp_ns
+    slow = [replace(one, stamp_ns=first_ns + 10 * (one.stamp_ns - first_ns) // 9) for one in moved[:-5]]
+    with pytest.raises(
+        InvalidData, match=r'paused for 111 ms .*, or raise the rate of its pose \(9 Hz; above 10 Hz is'
+    ):
+        check(model, replace(slides[2], states=slow))
 
 
 def test_a_finger_that_became_weak_gets_a_verdict_but_no_reference_and_no_correction(trained):

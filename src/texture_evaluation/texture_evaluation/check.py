@@ -63,14 +63,14 @@ def statistics_of(
 
 
 def _check_steady(slide: LabelledSlide) -> None:
-    """Raise InvalidData if the finger paused in the slide: late states, or several at one place."""
-    moves = (one for last, one in pairwise(slide.sliding) if (one.x_m, one.y_m) != (last.x_m, last.y_m))
-    stamps = [one.stamp_ns for one in (*slide.sliding[:1], *moves)]
-    pause_s = float(np.diff(stamps).max(initial=0)) / NANOSECONDS
-    if pause_s > PAUSE_S:
+    """Raise InvalidData if the finger paused after its first move: late states, or several at one place."""
+    moves = [one for last, one in pairwise(slide.sliding) if (one.x_m, one.y_m) != (last.x_m, last.y_m)]
+    steps_s = np.diff([one.stamp_ns for one in moves]) / NANOSECONDS
+    if steps_s.max(initial=0.0) > PAUSE_S:
         raise InvalidData(
-            f'the arm paused for {1e3 * pause_s:.0f} ms in the slide over the plate ({1e3 * PAUSE_S:.0f} ms are '
-            'allowed), so it shows nothing about the finger; stop other programs on the computer, and repeat'
+            f'the arm paused for {1e3 * steps_s.max():.0f} ms in the slide over the plate ({1e3 * PAUSE_S:.0f} ms are '
+            f'allowed), so it shows nothing about the finger; stop other programs on the computer, or raise the '
+            f'rate of its pose ({1 / np.median(steps_s):.2g} Hz; above {1 / PAUSE_S:g} Hz is needed), and repeat'
         )
 
 

@@ -139,9 +139,10 @@ CLOCKS: dict[str, tuple[Write, dict, Truth]] = {
     'ms that are called s': (csv(1e3 * T, X), {}, r'0\.1 Hz by its times; with unit: ms it were 100 Hz'),
     'us that are called ms': (csv(1e6 * T, X), timed('ms'), 'rate of .* with unit: us'),
     'ms that are called s at 8 kHz': (
-        csv((T / 80 * 1e3).round(6), X), {'conditions': {'speed': {'value': '0.5'}}},
-        'row 2: a slide lasts 75 s at 0.5 m/s, so it has 37.5 m; at most .* 10 m are .* its unit, which may be ms$',
+        csv((T / 80 * 1e3).round(6), X), {'conditions': {'speed': {'value': '1'}}},
+        'row 2: a slide lasts 75 s at 1 m/s, so it has 75 m; at most .* 50 m are .* its unit, which may be ms$',
     ),
+    'a turntable for two minutes': (csv(20 * T, X), {'conditions': {'speed': {'value': '0.1'}}}, CORK),
     'a speed of 0': (csv(T, X), {'conditions': {'speed': {'value': '0'}}}, 'speed of a slide is 0 m/s, plausible are'),
     'a force of 0': (csv(T, X), {'conditions': {'force': {'value': '0'}}}, 'is 0 N, .*; leave out what is unknown'),
     **{
@@ -204,6 +205,7 @@ CODES = {'label': {'column': 'l', 'names': {0: 'cork', 1: 'felt'}}, 'slides': {'
 BOTH = {
     'streams': {'signal': {'columns': ['x'], 'rate_hz': 100.0}, 'signal_static': {'columns': ['y'], 'rate_hz': 100}}
 }
+SLOW = {'signal': {'columns': ['x'], 'rate_hz': 500.0}, 'signal_static': {'columns': ['y'], 'rate_hz': 10.0}}
 PARTS = {**ANY, **RATE, 'files': '{a}_{run}.*', 'tables': 'data/{i}'}
 
 
@@ -277,6 +279,21 @@ LABELS: dict[str, tuple[Write, dict, Truth]] = {
         )
         for rows in (slice(1, None), slice(None, -1), slice(200, 330))
     },
+    **{
+        f'rows {first} to {stop} beside a slow stream, as another slide': (
+            npz(**{f'{number}/{name}': one for number, streams in enumerate((
+                {'x': LONG[:3000], 'y': LONG[3000:3060]}, {'x': LONG[4000:7000], 'y': LONG[7000:7060]},
+                {'x': LONG[first:stop], 'y': LONG[3000 + first // 50 : 3000 + stop // 50]},
+            )) for name, one in streams.items()}),
+            {**ANY, 'streams': SLOW, 'tables': '{i}'}, f"'cork_1.npz, 2/1' and 'cork_1.npz, 0/1' {SAME}",
+        )
+        for first, stop in ((0, 2950), (50, 3000), (1000, 1500))
+    },
+    'a slow stream that is the same beside one that is not': (
+        npz(**{f'{number}/{name}': one for number, fast in enumerate((LONG[:3000], LONG[4000:7000]))
+               for name, one in (('x', fast), ('y', LONG[3000:3060]))}),
+        {**ANY, 'streams': SLOW, 'tables': '{i}'}, [('cork', LONG[:3000]), ('cork', LONG[4000:7000])],
+    ),
     'a copy among others': (
         both(csv(T, X), csv(T, Y, name='felt_2.csv'), csv(T, np.r_[Y[:400], X[:200]], name='felt_3.csv')), {}, SAME,
     ),
@@ -306,7 +323,11 @@ LABELS: dict[str, tuple[Write, dict, Truth]] = {
     'a trial without a label': (
         csv(T, X, np.repeat([1, 2], 300), np.repeat(['cork', ''], 300), names='t,x,trial,l'),
         {'label': {'column': 'l'}, 'slides': {'by': 'column', 'column': 'trial'}},
-        "row 302, column 'l': the label is blank in all rows of a slide; write it into each row",
+        "row 302, column 'l': the label is blank in all rows of a slide; fill it in, or name another column$",
+    ),
+    'a blank label of the whole file': (
+        npz(x=X, l=''), {**ANY, **RATE, 'label': {'column': 'l'}},
+        'the label is blank in all rows of a slide; fill it in, or name another column$',
     ),
     'a label in the last row of each trial': (
         csv(T, X, np.repeat([1, 2], 300), [*[''] * 299, 'cork', *[''] * 299, 'felt'], names='t,x,trial,l'),
@@ -982,6 +1003,21 @@ def test_what_is_done_with_malformed_rows_is_said(tmp_path: Path) -> None:
         "'cork_1.csv', row 601, column 'all': the line has no end, so it may have been cut off",
     ]  # fmt: skip
     assert (report.streams['cork', 'signal']['samples'], report.streams['cork', 'signal']['NaN']) == (N - 1, 1)
+
+
+@pytest.mark.parametrize(('also', 'refused'), [(0, False), (18, False), (19, True)])
+def test_a_row_that_is_malformed_in_two_streams_counts_once(tmp_path: Path, also: int, refused: bool) -> None:
+    x, y, t = X.copy(), Y.copy(), T.copy()
+    x[100:142] = t[100:142] = x[300 : 300 + also] = y[300 : 300 + also] = np.nan
+    npz(x=x, y=y, t=t)(tmp_path)
+    time = {'column': 't'}
+    streams = {name: {'columns': [column], 'time': time, 'rate_hz': 100.0}
+               for name, column in (('signal', 'x'), ('signal_static', 'y'))}  # fmt: skip
+    if refused:
+        with pytest.raises(InvalidData, match='has 61 malformed rows of 600'):
+            run(tmp_path, streams=streams)
+    else:
+        assert run(tmp_path, streams=streams).slides == {'cork': 1}
 
 
 @pytest.mark.parametrize('every', [2, 10, 25])

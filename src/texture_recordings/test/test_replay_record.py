@@ -4,6 +4,8 @@
 
 import re
 import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -110,6 +112,21 @@ def test_who_only_listens_does_not_start_a_replay(tmp_path: Path) -> None:
         found = graph.peer.get_name()
     assert f"no node 'classifier' gets the samples or their features (waited 3 s; found: {found})" in replay.output
     assert 'published' not in replay.output
+
+
+def test_the_command_plays_a_bag_to_the_nodes_that_it_names(tmp_path: Path) -> None:
+    run = 'replay.configure(parser); sys.exit(replay.run(parser.parse_args()))'
+    script = f'import sys; from texture_recordings.commands.play import replay; parser = Parser(); {run}'
+    options = ['--slides', '2', '--rate', '2', '--namespace', 'left', '--listeners', 'peer']
+    with LocalGraph(100) as graph:
+        received, _ = (
+            graph.listen(TOPICS[name].type, f'/left/{name}', TOPICS[name].qos) for name in ('signal', 'exploration')
+        )
+        command = [sys.executable, '-c', f'from texture_core.cli import Parser; {script}', str(write(tmp_path / 'bag'))]
+        played = subprocess.run([*command, *options], check=False, capture_output=True, text=True)
+        assert played.returncode == 0, played.stderr
+        graph.until(lambda: received)
+    assert 'published 100 exploration, 100 signal' in played.stdout + played.stderr
 
 
 def test_streams_of_other_names_transforms_and_logs_are_recorded_and_with_all_everything(tmp_path) -> None:

@@ -212,6 +212,14 @@ def test_a_folder_in_place_of_a_mapping_is_refused(tmp_path: Path) -> None:
         load_mapping(tmp_path)
 
 
+def test_a_folder_of_the_name_of_a_shipped_mapping_does_not_hide_it(tmp_path: Path, monkeypatch) -> None:
+    (tmp_path / 'icub20').mkdir()
+    monkeypatch.chdir(tmp_path)
+    assert load_mapping('icub20').sensor == 'roboskin/taxels'
+    with pytest.raises(InvalidParameter, match='is a folder and no mapping'):
+        load_mapping('./icub20')
+
+
 def test_a_column_in_braces_and_whole_numbers_are_names() -> None:
     mapping = mapping_from({'streams': {'signal': {'columns': [0, 1, '3-5']}}, 'label': {'value': 7}})
     assert mapping.streams['signal'].columns == ['0', '1', '3-5']

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from texture_core.config import find_file, from_mapping, load_yaml, param, unknown_name
+from texture_core.config import find_file, from_mapping, load_yaml, param, shipped, unknown_name
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.types import MAX_HZ
 from texture_recordings.slides import STREAMS
@@ -263,7 +263,7 @@ class TableMapping:
 
 def load_mapping(name_or_path: str | Path) -> TableMapping:
     """Return the mapping in a file, or one that the package ships in config/mappings, by name."""
-    if Path(name_or_path).is_dir():
+    if Path(name_or_path).is_dir() and str(name_or_path) not in shipped('texture_recordings', 'config/mappings'):
         raise InvalidParameter(f"'{name_or_path}' is a folder and no mapping; the mapping comes before the source")
     path = find_file(str(name_or_path), 'texture_recordings', 'config/mappings', 'mapping')
     mapping = mapping_from(load_yaml(path, 'mapping'), f"mapping '{path}'")

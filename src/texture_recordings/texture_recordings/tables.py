@@ -59,7 +59,7 @@ from texture_recordings.readers import (
 
 PLAUSIBLE_HZ, LIKELY_HZ = (5.0, 200_000.0), (20.0, 20_000.0)
 LONGEST_SLIDE_S = 1800.0
-LONGEST_TRACK_M = 10.0  # several turns of a turntable; strokes of an arm are below 2 m
+LONGEST_TRACK_M = 50.0  # many turns of a turntable; a second at 8 kHz, read as 1000 s, has more
 MOST_ROUNDING, NO_CHANGE = 0.01, 1e-12  # of the standard deviation, and of the largest value, by rounding in 64 bits
 NAN = 'have NaN samples, and windows with one are unusable'
 SAME_TIME_S = 1e-9
@@ -109,24 +109,26 @@ class ImportReport:
         """Refuse a slide that has samples of one before: in training and test it would be no independent one.
 
         That is, in each stream, all samples or `RUN` changes in turn; twice as many are found wherever they begin.
+        A stream with fewer changes, as a slow one, counts only if all have fewer.
         """
-        others = []
+        votes: dict[bool, list[set[str]]] = {True: [], False: []}  # slides with the same, by whether there are `RUN`
         for topic, (signal, _) in streams.items():
             known, marks = self.runs[topic], [hash(signal.samples.tobytes())]
             same = known.keys() & marks
             for at in range(0, len(signal.samples), PART):
-                runs, more = _runs(signal.samples[at : at + PART])
+                runs = _runs(signal.samples[at : at + PART])
                 same |= known.keys() & runs
-                marks += more
-            others.append({known[one] for one in same})
+                marks += runs[::RUN]
+            others = {known[one] for one in same}
             if topic in self.last and _goes_on(self.last[topic][1], signal.samples):
-                others[-1].add(self.last[topic][0])
+                others.add(self.last[topic][0])
+            votes[len(marks) > 1].append(others)
             self.last[topic] = name, signal.samples
             for one in marks:
                 known.setdefault(one, name)
-        if all(others):
+        if all(copied := votes[True] or votes[False]):
             raise InvalidData(
-                f"the slides '{name}' and '{min(others[0])}' (file/number of the slide) have the same samples "
+                f"the slides '{name}' and '{min(copied[0])}' (file/number of the slide) have the same samples "
                 'in all or in a part; a copy is no further slide, nor is an overlapping window: remove one of them, or '
                 'its row or file'
             )
@@ -454,27 +456,28 @@ class FrameSlides:
             )
 
     def _fault(self, column: str, row: int, reason: object) -> InvalidData:
-        if self._frame[column].size < len(self._frame.columns) and self._frame.lines is None:
+        wide = self._frame.lines is None and self._frame[column].size < len(self._frame.columns)
+        if wide and isinstance(reason, ClockFault):
             reason = f'{reason}; if the array lies on its side, write format: {{transpose: true}}'
         return InvalidData(f"row {self._line(row)}, column '{column}': {reason}")
 
     def _check_malformed(self) -> None:
         """Count malformed rows of streams and cells of conditions; InvalidData if they are too many."""
-        frame, found, counts = self._frame, dict(self._malformed), Counter[tuple[int, str]]()
+        frame, found = self._frame, dict(self._malformed)
         self._report.rows += sum({length for length, _ in found})
         if frame.gaps is not None:
             found[len(frame.gaps), 'rows with a condition that is no number'] = frame.gaps
         for (length, done), rows in found.items():
-            counts[length, done.split(', ')[0]] += int(rows.sum())
-        for (length, done), rows in found.items():
             what, reasons = done.split(', ')[0], frame.gap_reasons if rows is frame.gaps else frame.reasons
+            alike = [one for (size, other), one in found.items() if size == length and other.startswith(what)]
+            count = np.count_nonzero(np.any(alike, axis=0))  # a row may be malformed in both streams
             marked = frame.lines[rows] if frame.lines is not None and len(frame.lines) == length else rows.nonzero()[0]
             known = [line for line in reasons if line in marked] or marked[:1].tolist()
             places = [f'row {line}, {reasons.get(line, "no finite number")}' for line in known] or ['no row at all']
             self._report.leave_out(done, len(marked), *(f"'{self._place}', {place}" for place in places))
-            if not length or (len(marked) and counts[length, what] > MAX_LEFT_OUT * length):
+            if not length or (len(marked) and count > MAX_LEFT_OUT * length):
                 raise InvalidData(
-                    f'it has {counts[length, what]} {what} of {length}, first {places[0]}; at most '
+                    f'it has {count} {what} of {length}, first {places[0]}; at most '
                     f'{100 * MAX_LEFT_OUT:g} % are taken; look at the columns and at `format` in the mapping'
                 )
 
@@ -567,10 +570,9 @@ class FrameSlides:
         low, high = PLAUSIBLE_HZ
         if not params.rate_hz and not low <= rate_hz <= high:
             likely = [f'; with unit: {one} it were {rate_hz / factor:g} Hz' for one, factor in _units(params, rate_hz)]
-            hint = likely[0] if likely else ''
             raise InvalidData(
-                f"the rate of '{name}' is {rate_hz:g} Hz by its times{hint}; give a column of time that grows and its "
-                f'unit, or `rate_hz`, from {low:g} to {high:g}'
+                f"the rate of '{name}' is {rate_hz:g} Hz by its times{''.join(likely[:1])}; give a column of time that "
+                f'grows and its unit, or `rate_hz`, from {low:g} to {high:g}'
             )
         self._report.rates_hz[name] = rate_hz
         return replace(stream, rate_hz=rate_hz / per_row, burst_s=burst_s)
@@ -599,8 +601,8 @@ class FrameSlides:
         known = np.flatnonzero(held != '')
         if not len(known):
             raise self._fault(
-                name, self._reference.rows[rows.start], f'the {kind} is blank in all rows of a slide; write it into '
-                'each row, or name another column'
+                name, self._reference.rows[rows.start],
+                f'the {kind} is blank in all rows of a slide; fill it in, or name another column',
             )  # fmt: skip
         first = str(held[known[0]])
         other = known[held[known] != first]
@@ -701,10 +703,8 @@ class FrameSlides:
         single = samples.astype(np.float32)
         known = np.isfinite(samples).all(axis=1)
         for channel, exact, error in zip(stream.channels, samples[known].T, (single - samples)[known].T, strict=True):
-            spread, far, off = (
-                exact.std() if known.any() else 0.0,
-                *(abs(one).max(initial=0.0) for one in (exact, error)),
-            )
+            spread = exact.std() if known.any() else 0.0
+            far, off = (abs(one).max(initial=0.0) for one in (exact, error))
             if spread > NO_CHANGE * far and off > MOST_ROUNDING * spread:
                 raise InvalidData(
                     f"channel '{channel}' of '{stream.name}' varies by {spread:.3g} (standard deviation) at {far:.9g}; "
@@ -762,16 +762,16 @@ def _changes(stream: Stream, within: slice) -> bool:
     return known.size < 2 * len(stream.channels) or bool((channels != channels[:1, :, :1]).any())
 
 
-def _runs(samples: AnyArray) -> tuple[list[int], list[int]]:
+def _runs(samples: AnyArray) -> list[int]:
     """Return a hash of each `RUN` successive changes of a slide, a change being a sample and how long it lasts.
 
-    The second list has those that begin at each `RUN`th change. Runs of few levels, as of coarse or periodic signals,
-    and runs that come again within the slide are left out: by chance or period other slides have them, too.
+    Runs of few levels, as of coarse or periodic signals, and runs that come again within the slide are left out: by
+    chance or period other slides have them, too.
     """
     rows = np.ascontiguousarray(samples).view(np.uint32)
     starts = np.flatnonzero((rows[1:] != rows[:-1]).any(axis=1)) + 1
     if len(starts) <= RUN:
-        return [], []
+        return []
     changes = np.column_stack([rows[starts[:-1]], np.diff(starts)]).astype(np.uint64)
     codes = changes @ (2 * np.random.default_rng(0).integers(2**62, size=changes.shape[1], dtype=np.uint64) + 1)
     order = np.argsort(codes, kind='stable')
@@ -782,8 +782,7 @@ def _runs(samples: AnyArray) -> tuple[list[int], list[int]]:
         codes ^= codes >> np.uint64(29)
         codes = codes[:-step] * np.uint64(0x9E3779B97F4A7C15) + codes[step:]
     _, places, counts = np.unique(codes, return_inverse=True, return_counts=True)
-    single = (known <= MOST_KNOWN) & (counts[places] == 1)
-    return codes[single].tolist(), codes[::RUN][single[::RUN]].tolist()
+    return codes[(known <= MOST_KNOWN) & (counts[places] == 1)].tolist()
 
 
 def _goes_on(before: AnyArray, after: AnyArray) -> bool:

@@ -38,13 +38,14 @@ def _configure_replay(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('bag', help='the bag, or a folder of bags')
     parser.add_argument('--rate', type=float, default=1.0, help='how many times faster than recorded')
     add_slides(parser)
+    parser.add_argument('--listeners', default=ReplayParams.listeners, help="nodes to wait for, in quotes; '' for none")
     parser.add_argument('--clock', action='store_true', help='publish the time of the recording on /clock')
     add_namespace(parser)
 
 
 def _replay(options: argparse.Namespace) -> int:
     from_mapping(ReplayParams, {'rate': options.rate})  # refused in one sentence
-    parameters = {'bag': options.bag, 'rate': options.rate, 'slides': options.slides, 'clock': options.clock}
+    parameters = {name: getattr(options, name) for name in ('bag', 'rate', 'slides', 'listeners', 'clock')}
     run_node(ReplayNode, {**parameters, 'deadline_s': RUNNING_S}, options.namespace)
     return 0
 

@@ -176,7 +176,7 @@ class ReplayNode(Node):
                     f"nothing is played, as no node '{missing[0]}' gets the samples or their features (waited "
                     f'{self._params.deadline_s:g} s; found: {", ".join(sorted(reached)) or "none"}); '
                     f'`texture launch replay bag:={self._params.bag}` also starts these nodes, --namespace names '
-                    'nodes that run elsewhere, and --listeners others'
+                    'nodes that run elsewhere, and --listeners other nodes'
                 )
 
     def _wait_alone(self) -> None:
