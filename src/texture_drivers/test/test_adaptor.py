@@ -294,16 +294,42 @@ def test_messages_lost_while_the_rate_is_measured_do_not_change_it_and_another_r
     fed(adaptor, make, [n for n in range(300) if n % 10 not in (2, 5, 6)], 10 * MS)
     assert (adaptor.rate_hz, adaptor.fault) == (100.0, '')
     fed(adaptor, make, range(150, 350), 20 * MS)
-    assert 'bring 50 samples a second, and 100 are expected; correct rate_hz' in adaptor.fault
+    assert 'bring 50 samples a second instead of 100, and are not published; correct rate_hz' in adaptor.fault
     fed(adaptor, make, range(700, 1100), 10 * MS)
     assert adaptor.fault == ''
+
+
+@pytest.mark.parametrize('times', [0.5, 0.97, 2.0])
+@pytest.mark.parametrize('mapping', ['wrench', 'anyskin', 'robotiq_tsf'])  # with a stamp, with neither, with a number
+def test_samples_at_a_wrong_rate_are_withheld_and_later_ones_have_the_right_times(mapping: str, times: float) -> None:
+    signal = load_mapping(mapping).signals['signal']
+    rate_hz = signal.rate_hz or 100.0
+    adaptor, make = SignalAdaptor('signal', replace(signal, rate_hz=rate_hz)), CASES[mapping, 'signal'][0]
+    wrong_hz, period_ns = times * rate_hz, NANOSECONDS / rate_hz
+    fed(adaptor, make, range(round(2.5 * wrong_hz)), NANOSECONDS / wrong_hz)
+    assert fed(adaptor, make, range(round(2.5 * wrong_hz), round(9 * wrong_hz)), NANOSECONDS / wrong_hz) == []
+    batches = fed(adaptor, make, range(round(9 * rate_hz), round(15 * rate_hz)), period_ns)
+    assert adaptor.fault == ''
+    assert jumps(batches) == 0
+    assert sum(len(batch.samples) for batch in batches) > 1.8 * rate_hz  # of 6 s: after two checks at most
+    ends_ns = [batch.end_ns - START_NS - 15 * NANOSECONDS for batch in batches]
+    assert ends_ns == pytest.approx(period_ns * np.arange(1 - len(batches), 1), abs=1.1 * period_ns)
+
+
+def test_times_that_stand_still_are_a_fault_and_those_of_a_clock_that_was_set_back_begin_anew() -> None:
+    adaptor, make = wrenches(), CASES['wrench', 'signal'][0]
+    for _ in range(2000):
+        adaptor.take(make(0, START_NS), START_NS)
+    assert "times of the messages on 'wrench' do not advance; check the clock of the driver" in adaptor.fault
+    fed(adaptor, make, range(-360_000, -359_600), 10 * MS)
+    assert (adaptor.rate_hz, adaptor.fault) == (100.0, '')
 
 
 def test_a_rate_that_is_set_and_wrong_is_a_fault_and_one_that_cannot_be_measured_too() -> None:
     make = CASES['wrench', 'signal'][0]
     adaptor = wrenches(rate_hz=97.0)
     fed(adaptor, make, range(300), 10 * MS)
-    assert 'bring 100 samples a second, and 97 are expected' in adaptor.fault
+    assert 'bring 100 samples a second instead of 97' in adaptor.fault
     adaptor = wrenches()
     pairs = [make(0, START_NS + n // 2 * 20 * MS + n % 2 * 1000) for n in range(300)]
     for message in pairs:
@@ -359,6 +385,14 @@ def test_a_lost_sample_leaves_a_gap_and_a_lost_number_none(ticks: int) -> None:
     assert len(driver.offsets()) == 1
     assert (adaptor.lost, adaptor.unpaired, adaptor.unnumbered) == (1, 1, 1)
     assert driver.batches[-1].end_ns == pytest.approx(driver.now_ns, abs=2 * MS)
+
+
+def test_numbers_whose_samples_do_not_come_are_counted_and_not_kept() -> None:
+    driver = Driver()
+    driver.run(900, **{f'at_{n}': (('sample',), 1) for n in range(500, 900)})
+    assert 300 < driver.adaptor.unpaired < 400
+    driver.run(100)
+    assert (driver.adaptor.unpaired, driver.adaptor.lost, driver.adaptor.unnumbered) == (400, 400, 0)
 
 
 def test_a_repeated_number_is_no_new_sample() -> None:

@@ -144,6 +144,14 @@ def test_a_stream_of_a_wrong_rate_is_not_published_again_before_its_rate_is_righ
     assert 200 < len(batches) < 300  # of 500 frames: after one check
 
 
+def test_the_rate_is_checked_on_a_line_that_loses_a_frame_each_second():
+    line, numbers = line_of(stream()), [number for number in range(3000) if number % 225]
+    with pytest.raises(DeviceError, match='delivers 2425 samples'):
+        run(line, numbers, rate_hz=2425.0)
+    line.restart()
+    assert len(run(line, numbers[:1000], offset_ns=START + 19 * SECOND)['signal']) > 700
+
+
 def test_one_hiccup_of_the_device_is_no_wrong_rate():
     tracker = StreamTracker(stream())
     for i in range(2000):

@@ -161,6 +161,9 @@ def read_time_ns(stamp: Any) -> int:
 
 MEASURED_S = 2.0
 LEAST_MESSAGES = 20
+# No node takes more messages in the time that passes: of more the times do not advance.
+MOST_AT_ONCE = 1000
+MOST_HZ = 10_000
 MOST_OFF = 0.25  # of a period: what is farther off a whole number of periods does not fit
 LEAST_FITTING = 0.75  # of the messages: of those that come in bursts or at random fewer fit
 LEAST_RECEIVED = 0.5  # of the periods: beyond, a period cannot be told from several
@@ -178,9 +181,14 @@ class PeriodMeter:
         self._messages: list[tuple[int, int]] = []  # of this stretch: samples and time, ns
 
     def add(self, samples: int, at_ns: int) -> tuple[float, bool] | None:
-        """Add a message; at the end of a stretch return the rate, Hz, and whether it is certain."""
+        """Add a message; after a stretch return rate, Hz, and whether it is certain; 0 if the times do not advance."""
+        if self._messages and at_ns < self._messages[0][1]:  # the clock was set back
+            self._messages = []
         self._messages.append((samples, at_ns))
         elapsed_ns = at_ns - self._messages[0][1]
+        if len(self._messages) > MOST_AT_ONCE + MOST_HZ * elapsed_ns / NANOSECONDS:
+            self._messages = []
+            return 0.0, False
         if elapsed_ns < MEASURED_S * NANOSECONDS or len(self._messages) < LEAST_MESSAGES:
             return None
         messages, self._messages = self._messages, []
@@ -227,7 +235,7 @@ class SignalAdaptor:
         self.mapping = mapping
         self.samples = self.lost = self.refused = self.invalid = self.unnumbered = self.unpaired = 0
         self.rate_hz = mapping.rate_hz  # 0 until it has been measured
-        self.fault = ''  # what is wrong with the rate
+        self.fault = ''  # what is wrong with the rate; while it holds no sample is published
         self._sensor, self._frame_id = mapping.sensor or name, frame_id
         self._channels = tuple(mapping.channels)
         self._values = [compile_path(path) for path in mapping.values]
@@ -249,7 +257,7 @@ class SignalAdaptor:
             self.refused += 1
             raise
         self._measure(len(sample.rows), sample.end_ns)
-        if not self.rate_hz:
+        if self.fault or not self.rate_hz:
             return
         if self.mapping.number_topic:
             self._samples.append(sample)
@@ -265,8 +273,8 @@ class SignalAdaptor:
         except InvalidData:
             self.refused += 1
             raise
-        if len(self._numbers) > MAX_WAITING and not self._samples:
-            self._numbers.popleft()
+        if len(self._numbers) > MAX_WAITING + len(self._samples):
+            self._numbers.pop()
             self.unpaired += 1
 
     def batches(self) -> list[TactileSignal]:
@@ -301,18 +309,25 @@ class SignalAdaptor:
         if certain and not self.rate_hz:
             self.rate_hz = rounded_rate(rate_hz)
             self._start()
-        if not self.rate_hz:
+        if not rate_hz:
+            self.fault = (
+                f"the times of the messages on '{self.mapping.topic}' do not advance; check the clock of the driver, "
+                'or leave `stamp` out of the mapping, and start the node again'
+            )
+        elif not self.rate_hz:
             self.fault = (
                 f"the messages on '{self.mapping.topic}' come unevenly, about {rate_hz:.4g} samples a second: their "
                 'rate cannot be measured; set rate_hz in the mapping'
             )
         elif certain and abs(rate_hz / self.rate_hz - 1) > RATE_TOLERANCE:
             self.fault = (
-                f"the messages on '{self.mapping.topic}' bring {rate_hz:.4g} samples a second, and {self.rate_hz:.4g} "
-                'are expected; correct rate_hz in the mapping, or start the node again to measure it'
+                f"the messages on '{self.mapping.topic}' bring {rate_hz:.4g} samples a second instead of "
+                f'{self.rate_hz:.4g}, and are not published; correct rate_hz in the mapping, or start the node again '
+                'to measure it'
             )
-        elif certain:
+        elif certain and self.fault:
             self.fault = ''
+            self._interrupt()
 
     def _read(self, message: Any, sent_ns: int) -> Sample:
         rows = self._rows(message)
@@ -403,6 +418,8 @@ class SignalAdaptor:
     def _interrupt(self) -> None:
         self._numbering.interrupt()
         self._counter.interrupt()
+        if self._clock is not self._numbering.clock:
+            self._clock.restart()
 
     # Samples without one.
 

@@ -358,10 +358,11 @@ class StreamTracker:
         self._failed_checks = 0
 
     def _check_rate(self, time_us: int, rows: int, lost_frames: int) -> None:
-        """Compare rows with time over stretches in which no frame was lost."""
-        if lost_frames or self._since_us is None:
+        """Compare rows, those of lost frames included, with time."""
+        if self._since_us is None:
             self._since_us, self._rows = time_us, rows
             return
+        self._rows += lost_frames * rows
         elapsed_s = (time_us - self._since_us) / MICROSECONDS
         if elapsed_s >= RATE_CHECK_S:
             rate_hz = self._rows / elapsed_s

@@ -440,8 +440,6 @@ LEAST_ARRIVALS = 20
 # Whole hertz from here on, below it three digits: each launch finds the same rate, off by less than the drift that a
 # clock follows (0.5 %).
 WHOLE_FROM_HZ = 100.0
-
-
 RATE_TOLERANCE = 0.02  # far more than clocks differ, far less than a wrong setting
 
 

@@ -119,7 +119,8 @@ class Adaptor(Node):
         level, sentence = next(((level, text) for holds, level, text in conditions if holds), ('OK', 'converting'))
         self._errors = self._errors + 1 if level == 'ERROR' else 0
         if self._errors == QUIET_REPORTS:
-            self._delivers &= sentence == rate_fault  # with that samples may come
+            # A rate withholds one signal; the others go on.
+            self._delivers &= sentence == rate_fault and not all(adaptor.fault for adaptor in adaptors)
             self.get_logger().warning(sentence)
         values = {
             'samples': sum(adaptor.samples for adaptor in adaptors),
