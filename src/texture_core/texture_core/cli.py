@@ -81,6 +81,12 @@ def add_namespace(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--namespace', default='', type=ros_namespace, metavar='NS', help='namespace of the nodes')
 
 
+def add_bag_namespace(parser: argparse.ArgumentParser) -> None:
+    """Add `--namespace` of what is read from bags."""
+    about = 'of the finger, if bags hold several'
+    parser.add_argument('--namespace', default=None, type=ros_namespace, metavar='NS', help=about)
+
+
 def add_slides(parser: argparse.ArgumentParser) -> None:
     """Add `--slides`."""
     parser.add_argument(

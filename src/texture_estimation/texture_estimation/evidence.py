@@ -10,6 +10,7 @@ import numpy as np
 
 from texture_core.types import NANOSECONDS, Array, FeatureVector, Rejection, TextureEstimate
 from texture_estimation.acceptance import SlideDistance, margin_of
+from texture_estimation.domain import OUTSIDE
 from texture_estimation.evidence_rules import GroupedEvidence, followed
 from texture_estimation.learners.learner import trust
 from texture_estimation.model import INVERSE_TEMPERATURE, TextureModel
@@ -145,13 +146,16 @@ class EvidenceAccumulator:
         margin = margin_of(first, second)
         distance = self._distance.to(best) if self._distance else math.inf
         rejection, decided = acceptance.assess(margin, distance, self._effective_windows)
-        if self._deviation:
+        deviation = self._deviation
+        if not deviation and model.labels[best] in acceptance.domain.unfelt:  # whoever shows it louder shows another
+            deviation = f'{OUTSIDE}: slides of {model.labels[best]} are as quiet as the sensor at rest'
+        if deviation:
             rejection = Rejection.OUTSIDE_TRAINING
         elif not single and rejection is Rejection.NONE:
             rejection = Rejection.AMBIGUOUS
         reported = tuple(acceptance.limited(listed))
-        members, reasons = list[int](), [self._deviation, self._message]
-        if final and not self._deviation:
+        members, reasons = list[int](), [deviation, self._message]
+        if final and not deviation:
             members = acceptance.members(probabilities, self._effective_windows)
             too_little = rejection is Rejection.TOO_LITTLE_TRAINING
             reasons.append(acceptance.reason if too_little else acceptance.decided_reason)

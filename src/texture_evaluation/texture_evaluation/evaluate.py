@@ -80,7 +80,9 @@ class EvaluationReport:
         }
 
 
-def evaluate(model: TextureModel, bags: Iterable[str | Path], slides: str = '') -> EvaluationReport:
+def evaluate(
+    model: TextureModel, bags: Iterable[str | Path], slides: str = '', namespace: str | None = None
+) -> EvaluationReport:
     """Return how a model does on the labelled slides of bags.
 
     Parameters
@@ -91,6 +93,8 @@ def evaluate(model: TextureModel, bags: Iterable[str | Path], slides: str = '') 
         Bags, or folders of bags.
     slides
         Which slides of each surface, such as '31-40'; '' for all. Surfaces without training are unknown ones.
+    namespace
+        Namespace of the finger, if bags hold several.
 
     Returns
     -------
@@ -103,7 +107,8 @@ def evaluate(model: TextureModel, bags: Iterable[str | Path], slides: str = '') 
     InvalidData
         If a bag cannot be read or no slide is usable.
     """
-    return evaluate_dataset(model, SlideDataset.from_bags(bags, slides, topics=model.recipe.feature_set.topics))
+    topics = model.recipe.feature_set.topics
+    return evaluate_dataset(model, SlideDataset.from_bags(bags, slides, namespace, topics=topics))
 
 
 def evaluate_dataset(model: TextureModel, dataset: SlideDataset) -> EvaluationReport:

@@ -26,6 +26,8 @@ def train_from_bags(
     bags: Sequence[str | Path],
     slides: str = '',
     out: str | Path | None = None,
+    *,
+    namespace: str | None = None,
 ) -> TextureModel:
     """Return a model trained on the labelled slides of bags, and save it; a TextureError states what is wrong.
 
@@ -39,13 +41,15 @@ def train_from_bags(
         Which slides of each surface, such as '1-30'; '' for all.
     out
         Path of the model, with or without .npz; not saved if None.
+    namespace
+        Namespace of the finger, if bags hold several.
 
     Returns
     -------
     TextureModel
     """
     plan = load_recipe(recipe)
-    dataset = SlideDataset.from_bags(bags, slides, topics=plan.feature_set.topics)
+    dataset = SlideDataset.from_bags(bags, slides, namespace, topics=plan.feature_set.topics)
     examples = training_examples(plan, dataset)
     with task(f"fitting '{plan.name}' to {len(examples.y)} windows"):
         model = train(plan, examples, _name(out, plan.name))
@@ -71,11 +75,13 @@ def train_grades_from_bags(
     grades: str | Path,
     slides: str = '',
     out: str | Path | None = None,
+    *,
+    namespace: str | None = None,
 ) -> RoughnessModel:
     """Return a roughness model trained on labelled slides, and save it; a TextureError states what is wrong."""
     plan, table = load_roughness_recipe(recipe), read_grades(grades)
     windows = replace(plan.feature_set, windows=plan.training_windows)
-    examples = SlideDataset.from_bags(bags, slides, topics=windows.topics).features(windows)
+    examples = SlideDataset.from_bags(bags, slides, namespace, topics=windows.topics).features(windows)
     with task(f"fitting '{plan.name}' to {len(examples.y)} windows"):
         model = train_grades(plan, examples, table, _name(out, plan.name))
     if out is not None:

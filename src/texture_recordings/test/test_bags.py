@@ -135,7 +135,7 @@ def test_the_fingers_of_an_explorer_are_of_its_namespace_and_keep_their_names(tm
         'finger1/signal'
     ]
     assert {topic for topic, _, _ in read_bag(tmp_path / 'bag', None, 'right')} == {'exploration', 'signal'}
-    with pytest.raises(InvalidData, match='the namespaces /left, /right; name one of them'):
+    with pytest.raises(InvalidData, match=r'the namespaces /left, /right; name one of them \(--namespace\)'):
         topics_in(tmp_path / 'bag')
 
 

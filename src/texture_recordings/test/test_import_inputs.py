@@ -751,6 +751,10 @@ CONTAINERS: dict[str, tuple[Write, dict, Truth]] = {
     'two sounds': (wav(2 * N, 2), SOUND, 'has 2 chunks of sound'),
     'a WAV file of many channels': (wav(2 * N, channels=65535), SOUND, 'declares 65535 channels .* from 1 to 10000'),
     'a WAV file of no channels': (wav(2 * N, channels=0), SOUND, 'declares 0 channels'),
+    'an array with the name of the windows': (
+        npz(X=np.random.default_rng(0).normal(size=(20, 100, 3)), trial=np.repeat(range(5), 4)),
+        {**ANY, 'streams': {'signal': {'columns': ['X.*'], 'rate_hz': 100.0}}}, "'trial' is the number of a window",
+    ),
     'trials as one slide': (
         npz(X=np.ones((20, 100, 3))), {**ANY, 'streams': {'signal': {'columns': ['X.*'], 'rate_hz': 100.0}}},
         r'slides: \{by: column, column: trial\}',

@@ -367,7 +367,7 @@ def connections_below(path: Path, connections: list[Connection], namespace: str 
     namespaces = {topic: topic.removesuffix(name).rstrip('/') or '/' for topic, name in names.items()}
     found = sorted(set(namespaces.values()))
     if namespace is None and len(found) > 1:
-        raise InvalidData(f"the bag '{path}' has the namespaces {', '.join(found)}; name one of them")
+        raise InvalidData(f"the bag '{path}' has the namespaces {', '.join(found)}; name one of them (--namespace)")
     prefix = found[0] if namespace is None else '/' + namespace.strip('/')
     if prefix not in found:
         raise InvalidData(f"the bag '{path}' has no namespace '{prefix}'; it has {', '.join(found)}")

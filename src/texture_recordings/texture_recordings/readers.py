@@ -682,6 +682,8 @@ def _unfolded(arrays: Mapping[str, AnyArray], meant: set[str]) -> dict[str, AnyA
         else:
             flat = array.reshape(-1, array.shape[-1])
             columns |= {_joined(name, str(number)): flat[:, number] for number in range(flat.shape[1])}
+    if trials and TRIAL in columns:
+        raise InvalidData(f"'{TRIAL}' is the number of a window here, and an array has this name; give it another")
     if trials:
         columns[TRIAL] = np.repeat(np.arange(trials[0]), trials[1])
     return columns

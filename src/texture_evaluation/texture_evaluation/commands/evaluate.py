@@ -11,7 +11,7 @@ from importlib.metadata import version
 from itertools import takewhile
 from pathlib import Path
 
-from texture_core.cli import Command, add_dask, add_seed, add_slides, core_count
+from texture_core.cli import Command, add_bag_namespace, add_dask, add_seed, add_slides, core_count
 from texture_core.config import refuse_inputs, shipped, write_json
 from texture_core.errors import InvalidParameter
 from texture_estimation.model import both_files, load_model
@@ -33,13 +33,14 @@ def _configure_evaluate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('bags', nargs='+', help='labelled bags, or folders of bags')
     parser.add_argument('--json', metavar='FILE', help='also write the figures there')
     add_slides(parser)
+    add_bag_namespace(parser)
 
 
 def _evaluate(options: argparse.Namespace) -> int:
     """Evaluate, print the figures, and write them with --json."""
     refuse_inputs([options.json], [*both_files(options.model), *options.bags])
     model = load_model(options.model)
-    report = evaluate(model, options.bags, options.slides)
+    report = evaluate(model, options.bags, options.slides, options.namespace)
     print('\n'.join(summary(report)))
     if options.json:
         setting = {
@@ -69,6 +70,7 @@ def _configure_cross_validate(parser: argparse.ArgumentParser) -> None:
     )
     add_dask(parser)
     add_slides(parser)
+    add_bag_namespace(parser)
     add_seed(parser)
 
 
@@ -82,7 +84,7 @@ def _cross_validate(options: argparse.Namespace) -> int:
         refuse_chart_format(options.chart)
     recipes = [load_recipe(name) for name in names]
     topics = dict.fromkeys(topic for recipe in recipes for topic in recipe.feature_set.topics)
-    dataset = split.cut(SlideDataset.from_bags(bags, options.slides, topics=tuple(topics)))
+    dataset = split.cut(SlideDataset.from_bags(bags, options.slides, options.namespace, topics=tuple(topics)))
     for recipe in recipes:  # one that lacks a stream is refused before the others are computed
         cut_slide(dataset[0], recipe.feature_set)
     with dask_backend(options.dask) if options.dask else nullcontext():

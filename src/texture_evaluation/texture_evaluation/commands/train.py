@@ -8,7 +8,7 @@ import argparse
 from collections.abc import Mapping
 from pathlib import Path
 
-from texture_core.cli import add_slides
+from texture_core.cli import add_bag_namespace, add_slides
 from texture_core.config import shipped
 from texture_core.errors import InvalidParameter
 from texture_estimation.acceptance import LEAST_SLIDES_A_LABEL
@@ -29,18 +29,21 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('-o', '--out', required=True, metavar='MODEL', help='makes MODEL.npz and MODEL.json')
     parser.add_argument('--force', action='store_true', help='replace a model that is there already')
     add_slides(parser)
+    add_bag_namespace(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Train, save, and report what was trained."""
     _check_place(Path(options.out), replace=options.force)
     if options.grades:
-        graded = train_grades_from_bags(options.recipe, options.bags, options.grades, options.slides, options.out)
+        graded = train_grades_from_bags(
+            options.recipe, options.bags, options.grades, options.slides, options.out, namespace=options.namespace
+        )
         print('\n'.join(graded_summary(graded, Path(options.out))))
         return 0
     if options.recipe in shipped('texture_estimation', 'config/roughness'):
         raise InvalidParameter(f"recipe '{options.recipe}' learns grades of roughness; give them with --grades FILE")
-    model = train_from_bags(options.recipe, options.bags, options.slides, options.out)
+    model = train_from_bags(options.recipe, options.bags, options.slides, options.out, namespace=options.namespace)
     for line in summary(model, Path(options.out)):
         print(line)
     return 0

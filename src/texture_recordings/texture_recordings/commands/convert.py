@@ -10,7 +10,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from texture_core.cli import Command, add_parameters, add_slides, parameters_from, task
+from texture_core.cli import Command, add_bag_namespace, add_parameters, add_slides, parameters_from, task
 from texture_core.config import find
 from texture_core.errors import InvalidParameter
 from texture_features.segmentation import SegmentationParams
@@ -70,7 +70,7 @@ def _configure_segment(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('bags', nargs='+', help='bags, or folders of bags')
     parser.add_argument('--out', required=True, metavar='DIR', help='folder for the copies with the states found')
     parser.add_argument('--surface', default='', metavar='NAME', help='label of all slides; default: as in the bag')
-    parser.add_argument('--namespace', default=None, metavar='NS', help='of the finger, if bags hold several')
+    add_bag_namespace(parser)
     add_parameters(parser, SegmentationParams)
 
 
@@ -85,7 +85,7 @@ def _segment(options: argparse.Namespace) -> int:
 def _configure_export(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('bags', nargs='+', help='bags, or folders of bags')
     parser.add_argument('-o', '--out', required=True, metavar='DIR', help='folder to make')
-    parser.add_argument('--namespace', default=None, metavar='NS', help='of the finger, if bags hold several')
+    add_bag_namespace(parser)
     add_slides(parser)
 
 
