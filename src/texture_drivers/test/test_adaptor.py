@@ -245,6 +245,13 @@ def noise(seed: int, count: int = 400) -> Any:
     return np.random.default_rng(seed).random(count)
 
 
+def test_messages_that_do_not_come_are_counted_by_their_times() -> None:
+    meter = PeriodMeter()
+    kept = [n for n in range(201) if n % 10 not in (3, 7)]
+    assert [meter.add(1, START_NS + 10 * n * MS) for n in kept][-1] == (pytest.approx(100.0), True)
+    assert meter.missing == pytest.approx(0.2, abs=0.01)
+
+
 # Of messages each 10 ms; those that are kept back for 60 ms come at once.
 EVEN = np.arange(400) * 10.0
 IN_TIME = np.arange(400) % 40 < 6

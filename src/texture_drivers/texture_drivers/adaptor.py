@@ -178,6 +178,7 @@ class PeriodMeter:
     """
 
     def __init__(self) -> None:
+        self.missing = 0.0  # fraction of the messages of the last certain stretch that did not come
         self._messages: list[tuple[int, int]] = []  # of this stretch: samples and time, ns
 
     def add(self, samples: int, at_ns: int) -> tuple[float, bool] | None:
@@ -206,6 +207,7 @@ class PeriodMeter:
                 last_ns, periods, fitting = time_ns, periods + round(steps), fitting + 1
         if fitting < max(LEAST_FITTING * len(steps_ns), LEAST_RECEIVED * periods):
             return average_hz, False
+        self.missing = 1.0 - fitting / periods
         return counts[0] * periods * NANOSECONDS / (last_ns - times_ns[0]), True
 
 
@@ -299,6 +301,11 @@ class SignalAdaptor:
         self._clock = StreamClock(rate_hz) if self._stamp and not self._number else self._numbering.clock
         self._counter = SampleCounter(ticks=0)
         self._next_index, self._end_ns = 0, 0
+
+    @property
+    def missing(self) -> float:
+        """Fraction of the newest messages that did not come, as far as only their times tell it."""
+        return 0.0 if self.mapping.number or self.mapping.number_topic else self._meter.missing
 
     def _measure(self, samples: int, at_ns: int) -> None:
         """Measure the rate until it is known, then compare what is measured with it."""

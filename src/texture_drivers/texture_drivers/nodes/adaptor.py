@@ -20,6 +20,7 @@ from texture_drivers.adaptor import SignalAdaptor, load_mapping, losses
 from texture_drivers.health import BEFORE_THE_START
 from texture_drivers.sensor import BatchParams
 
+MOST_MISSING = 0.05  # of the messages: of fewer the frequencies are off by less
 QUIET_REPORTS = 5  # on an error, one each second, before it is logged: the driver may start after the node
 
 
@@ -101,6 +102,7 @@ class Adaptor(Node):
         received, fault = self._received, self._fault
         rate_fault = next((adaptor.fault for adaptor in adaptors if adaptor.fault), '')
         self._received, self._fault = 0, ''
+        missing = max(adaptor.missing for adaptor in adaptors)
         lost = sum(adaptor.lost for adaptor in adaptors)
         new, self._lost = lost - self._lost, lost
         topics = ', '.join(sorted({f"'{self.resolve_topic_name(one.mapping.topic)}'" for one in adaptors}))
@@ -115,6 +117,12 @@ class Adaptor(Node):
             (bool(rate_fault), 'ERROR', rate_fault),
             (new > 0, 'WARN', f'{new} samples lost since the last report'),
             (not any(adaptor.samples for adaptor in adaptors), 'WARN', 'measuring rates and times'),
+            (
+                missing > MOST_MISSING,
+                'WARN',
+                f'{missing:.0%} of the messages are missing, and short gaps are closed up: times and frequencies are '
+                'wrong; mend the connection to the driver, or map its number',
+            ),
         )
         level, sentence = next(((level, text) for holds, level, text in conditions if holds), ('OK', 'converting'))
         self._errors = self._errors + 1 if level == 'ERROR' else 0
