@@ -133,9 +133,10 @@ def test_a_node_that_had_to_be_killed_fails_the_launch_and_the_finger_is_named(l
     assert any('whether the finger still presses' in line for line in launched.lines)
 
 
-def test_a_node_that_dies_is_named_with_its_code_and_the_others_go_on(launch) -> None:
-    launched = launch({'good': GOOD, 'bad': 'exit 3'})
-    launched.wait_for('bad died with exit code 3')
+@pytest.mark.parametrize(('name', 'code'), [('bad', 3), ('dashboard', 2)])  # a page that cannot listen stops no arm
+def test_a_node_that_dies_is_named_with_its_code_and_the_others_go_on(launch, name, code) -> None:
+    launched = launch({'good': GOOD, name: f'exit {code}'})
+    launched.wait_for(f'{name} died with exit code {code}')
     assert launched.process.poll() is None
     launched.process.send_signal(signal.SIGINT)
     assert launched.end() == 1
@@ -156,6 +157,7 @@ def test_a_node_that_dies_is_named_with_its_code_and_the_others_go_on(launch) ->
         ),
         # It was started wrongly.
         ('echo texture: why; exit 2', 'respawn="true"', (2, 1), 'died with exit code 2: texture: why'),
+        ('echo texture: why; exit 2', '', (2, 1), 'died with exit code 2: texture: why'),
     ],
 )
 def test_the_death_of_a_needed_node_stops_the_others_and_is_named_last(

@@ -262,6 +262,7 @@ STOPPING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 POLL_S = 0.1
 PROFILES = ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE')  # where Fast DDS looks for settings
 MISTAKE = 2  # exit code of a node that has reported an invalid input
+DISPENSABLE = ('dashboard', 'views')  # what was given to them wrongly stops no arm
 
 
 class Supervisor:
@@ -350,6 +351,7 @@ class Supervisor:
         restart = node.respawn and code != MISTAKE and not (stopping or self._together)
         restart = restart and (node.respawn_max_retries < 0 or process.deaths < node.respawn_max_retries)
         needed = node.needed or node.respawn or (self._together and code != 0)
+        needed = needed or (code == MISTAKE and node.executable not in DISPENSABLE)
         if code != 0 and not (stopping or restart):
             self._code = MISTAKE if code == MISTAKE and needed else 1
         pressing = f'; {MAY_PRESS if restart else PRESSES}' * (node.executable == EXPLORER and code not in (0, MISTAKE))

@@ -22,6 +22,7 @@ from texture_core.types import NANOSECONDS
 
 BAR, LABELS = 30, 5
 LONGEST_PAUSE_S = 1.0  # between two messages of a bag
+NO_SAMPLES = 'no samples yet (live: start the nodes, or give their --namespace)'
 Frame = Mapping[str, Any]
 
 
@@ -89,7 +90,7 @@ def picture(frame: Frame, peak: float) -> Group:
     rows.add_column(min_width=12)
     level = signal['level'] or 0.0
     named = f'{level:.3g} {signal["unit"]}  {signal["sensor"]} {signal["channel"]}'
-    rows.add_row('signal', bar(level / peak if peak else 0.0, 'cyan'), named if signal['sensor'] else 'no samples yet')
+    rows.add_row('signal', bar(level / peak if peak else 0.0, 'cyan'), named if signal['sensor'] else NO_SAMPLES)
     rows.add_row(Text(state['phase'], style='bold'), bar(state['progress'] or 0.0, 'white'), finger_text(state))
     rows.add_row()
     style = 'green' if texture['accepted'] else 'yellow'
@@ -133,7 +134,7 @@ def _lines(feed: Feed) -> Callable[[], None]:
 def line(frame: Frame) -> str:
     """Return a frame as one line."""
     signal, state, texture = frame['signal'], frame['state'], frame['texture']
-    level = f'level {signal["level"]:.3g} {signal["unit"]}' if signal['level'] is not None else 'no samples'
+    level = f'level {signal["level"]:.3g} {signal["unit"]}' if signal['level'] is not None else NO_SAMPLES
     roughness = f'roughness {frame["roughness"]["text"]}' if frame['roughness']['valid'] else ''
     return ' | '.join(filter(None, [f'{state["phase"]:<9}', finger_text(state), level, texture['text'], roughness]))
 
