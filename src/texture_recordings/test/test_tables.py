@@ -145,6 +145,7 @@ def test_losses_and_rows_whose_times_contradict_each_other_are_counted(tmp_path:
         ('{column: t, unit: ms}', '{column: t, unit: s}\n    rate_hz: 100', '0.1 Hz by its times, 100 Hz are'),
         ("['acc_*']\n    channels: [x, y, z]", '[phase]', "'phase' is a channel .* under `slides`"),
         ('[stroke 1, stroke 2, stroke 3]', '[stroke]', "column 'phase' has none of the values stroke; it has rest"),
+        ('[stroke 1, stroke 2, stroke 3]', '[stroke 1, stroke 4]', "'phase' has 'stroke 4' in no file; it has rest"),
         ('{column: material}', '{column: materiel}', "no column 'materiel'; did you mean 'material'"),
         ('.csv', '.dat', "has the form '{day}, {material}, v{speed}.dat'"),
         ('speed: {column: speed, unit: mm/s}', 'speed: {column: day}', "'day' is '2031-05-01' in its name"),

@@ -98,6 +98,7 @@ class ImportReport:
     columns: dict[str, list[str]] = field(default_factory=dict)  # of each stream in the first file
     runs: dict[str, dict[int, str]] = field(default_factory=lambda: defaultdict(dict))  # see `refuse_copy`
     last: dict[str, tuple[str, AnyArray]] = field(default_factory=dict)  # name and samples of the slide before
+    phases: set[str] = field(default_factory=set)  # in the column of the slides
 
     def leave_out(self, reason: str, count: int, *examples: str) -> None:
         """Count what is left out, with the first places."""
@@ -206,6 +207,10 @@ def import_tables(
                     'bags were cut off, and end with their last whole part', 1, f"'{place}'; see mcap recover"
                 )
         report.refuse_like_labels(mapping.label.names)
+        for value in filter(None, mapping.slides.values):
+            if not any(_is_one_of(run, [value]) for run in report.phases):
+                has = ', '.join(sorted(report.phases)[:5])
+                raise InvalidData(f"column '{mapping.slides.column}' has '{value}' in no file; it has {has}")
         if not report.slides:
             left = [f'{count} {reason}' for reason, count in report.left_out.items() if reason.startswith('slides')]
             raise InvalidData(
@@ -508,6 +513,7 @@ class FrameSlides:
                     starts = np.union1d(starts, rows[jumps_back(*disorder(times[rows]))])
         spans = [slice(first, last) for first, last in pairwise([0, *starts.tolist(), count])]
         if wanted is not None:
+            self._report.phases.update(wanted[one.start] for one in spans)
             spans = [one for one in spans if _is_one_of(wanted[one.start], params.values or ['?*'])]
             if not spans:
                 values, has = ', '.join(params.values) or 'but empty', ', '.join(sorted({*wanted.tolist()})[:5])
