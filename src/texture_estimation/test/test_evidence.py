@@ -87,12 +87,12 @@ def test_outside_the_training_nothing_is_accepted_or_decided_and_every_estimate_
         assert (estimate.label, estimate.message) == ('felt', sentence)
 
 
-def test_a_surface_that_the_finger_never_felt_is_not_accepted_and_others_are(model, examples):
-    unfelt = with_acceptance(unlimited(model), domain=Domain(unfelt=('felt',)))
-    for estimate in predict(unfelt, vectors(examples)):
+def test_a_label_of_slides_as_quiet_as_the_sensor_at_rest_is_rejected_and_others_accepted(model, examples):
+    quiet = with_acceptance(unlimited(model), domain=Domain(quiet_labels=('felt',)))
+    for estimate in predict(quiet, vectors(examples)):
         assert (estimate.accepted, estimate.decided, estimate.label) == (False, False, 'felt')
         assert estimate.message == 'outside the training: slides of felt are as quiet as the sensor at rest'
-    assert predict(unfelt, vectors(examples, 'wood'))[-1].accepted
+    assert predict(quiet, vectors(examples, 'wood'))[-1].accepted
 
 
 def test_the_mean_speed_of_the_exploration_counts_not_that_of_one_window(model, examples):

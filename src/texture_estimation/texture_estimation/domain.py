@@ -82,7 +82,7 @@ class Domain:
     speed_margin: float = SPEED_MARGIN
     force_margin: float = FORCE_MARGIN
     rest: Mapping[str, float] = field(default_factory=dict)  # median level of each channel before the touch
-    unfelt: tuple[str, ...] = ()  # labels of which each slide is as quiet as the sensor at rest
+    quiet_labels: tuple[str, ...] = ()  # labels of which each slide is as quiet as the sensor at rest
     places: int = 0  # or sessions, of the label that has most; 0 if unknown
 
     def __post_init__(self) -> None:

@@ -147,7 +147,7 @@ class EvidenceAccumulator:
         distance = self._distance.to(best) if self._distance else math.inf
         rejection, decided = acceptance.assess(margin, distance, self._effective_windows)
         deviation = self._deviation
-        if not deviation and model.labels[best] in acceptance.domain.unfelt:  # whoever shows it louder shows another
+        if not deviation and model.labels[best] in acceptance.domain.quiet_labels:
             deviation = f'{OUTSIDE}: slides of {model.labels[best]} are as quiet as the sensor at rest'
         if deviation:
             rejection = Rejection.OUTSIDE_TRAINING

@@ -390,7 +390,7 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
     )
     quiet = [(label, why) for label, made in zip(of_slides, conditions, strict=True) if (why := domain.quiet(made))]
     counts = Counter(label for label, _ in quiet)
-    domain = replace(domain, unfelt=tuple(label for label in counts if counts[label] == domain.slides[label]))
+    domain = replace(domain, quiet_labels=tuple(label for label in counts if counts[label] == domain.slides[label]))
     acceptance = Acceptance(0 if fitted.held_out is None else len(slides), recipe.training.rates, domain)
     if not acceptance.reason:
         followed_slides = Followed(bound, examples)

@@ -991,7 +991,7 @@ def run(folder: Path, kinds: tuple[str, ...] = MAPPED['table'], **content: Any) 
     return import_tables(mapping, source, folder / 'bags', kinds)
 
 
-def test_what_is_done_with_malformed_rows_is_said(tmp_path: Path) -> None:
+def test_the_report_states_how_malformed_rows_were_treated(tmp_path: Path) -> None:
     cells = [f'{t:.2f},{x}' for t, x in zip(T, X, strict=True)]
     cells[7] = f',{X[7]}'  # without a time
     cells[20] = '0.20,oops'

@@ -163,7 +163,7 @@ def test_streams_of_other_names_transforms_and_logs_are_recorded_and_with_all_ev
     assert all(log_ns > began_ns for _, log_ns, _ in read_bag(out))  # the time of this machine
 
 
-def test_beside_another_explorer_below_only_the_own_fingers_are_recorded(tmp_path) -> None:
+def test_topics_in_the_namespace_of_another_explorer_are_not_recorded(tmp_path) -> None:
     batch = to_msg(TactileSignal(5, 's', ('a',), (), 1000.0, 0, np.zeros((10, 1), dtype=np.float32)))
     given = {'out': str(tmp_path / 'bag'), 'signal_topics': 'signal finger1/signal'}
 
