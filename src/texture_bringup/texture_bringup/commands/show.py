@@ -132,11 +132,11 @@ def _info(options: argparse.Namespace) -> int:
 def _model_lines(path: Path) -> list[str]:
     from texture_core.config import load_card
     from texture_core.errors import InvalidData
-    from texture_estimation.model import load_model
+    from texture_estimation.model import both_files, load_model
     from texture_estimation.roughness import load_roughness_model
     from texture_evaluation.commands.train import graded_summary, summary
 
-    card = path.with_name(f'{path.name.removesuffix(".npz").removesuffix(".json")}.json')
+    _, card = both_files(path)
     if not card.is_file():
         raise InvalidData(f"there is no card '{card}' of the model; copy both of its files")
     if 'regressor' in load_card(card):
