@@ -132,7 +132,8 @@ class NodeDescription:
     """One node to run.
 
     `namespace` is absolute, or '' where the file names none. Each item of `parameters` is a parameter file or a
-    mapping of names to values; later ones override earlier ones. `environment` is the whole environment of the process.
+    mapping of names to values; later ones override earlier ones. `origins` holds the texts of these values as the file
+    has them, by name. `environment` is the whole environment of the process.
     """
 
     package: str
@@ -140,6 +141,7 @@ class NodeDescription:
     name: str = ''
     namespace: str = ''
     parameters: tuple[Path | Mapping[str, Any], ...] = ()
+    origins: Mapping[str, str] = field(default_factory=dict)
     remappings: tuple[tuple[str, str], ...] = ()
     respawn: bool = False
     respawn_delay_s: float = 0.0
@@ -151,6 +153,11 @@ class NodeDescription:
     def label(self) -> str:
         """Name of the node in the output: its full name as far as the file gives it."""
         return f'{self.namespace.lstrip("/")}/{self.name or self.executable}'.lstrip('/')
+
+    @property
+    def full_name(self) -> str:
+        """Its name in ROS, for a node that bears the name of its program unless the file gives one."""
+        return f'{self.namespace.rstrip("/")}/{self.name or self.executable}'
 
     @property
     def parameter_key(self) -> str:
@@ -511,6 +518,10 @@ def _root(path: Path) -> Element:
     except FileRefused as error:
         raise InvalidLaunch(f"launch file '{path}' is not read: {error}") from error
     except (ElementTree.ParseError, LookupError, ValueError) as error:  # the last two: of its encoding
+        if path.suffix == '.py':
+            raise InvalidLaunch(
+                f"'{path}' is a launch file in Python, which `ros2 launch` runs; XML is needed"
+            ) from error
         raise InvalidLaunch(f"launch file '{path}' is not well-formed XML: {error}") from error
     if root.tag != 'launch':
         raise InvalidLaunch(f"launch file '{path}' begins with <{root.tag}>; <launch> is needed")
@@ -660,6 +671,7 @@ class _Reader:
                 name=texts.get('name', ''),
                 namespace=namespace or '/' * ('namespace' in texts),
                 parameters=tuple(self._parameter(item, owner) for item in element.findall('param')),
+                origins={item.get('name', ''): item.get('value', '') for item in element.findall('param')},
                 remappings=tuple((self.text(item, 'from'), self.text(item, 'to')) for item in element.findall('remap')),
                 respawn=respawn,
                 respawn_delay_s=delay_s,
@@ -680,6 +692,6 @@ class _Reader:
         if not path.is_file():
             if path.parts[-4:-1] == ('texture_bringup', 'config', 'robots'):
                 raise unknown_name(path.stem, [item.stem for item in path.parent.glob('*.yaml')], 'preset')
-            raise InvalidLaunch(f"there is no parameter file '{path}'; give the path of one")
+            raise InvalidLaunch(f"there is no parameter file '{self.text(element, 'from')}'; give the path of one")
         check_parameter_file(path, owner)
         return path
