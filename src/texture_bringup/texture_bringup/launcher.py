@@ -26,7 +26,6 @@ from xml.etree.ElementTree import Element
 from texture_core.config import (
     PARSE_ERRORS,
     FileRefused,
-    check_parameter_file,
     executable,
     find,
     find_file,
@@ -654,11 +653,6 @@ class _Reader:
         if (on_exit := texts.get('on_exit', 'shutdown')) != 'shutdown':
             raise InvalidLaunch(f"'on_exit' of <node> is '{on_exit}'; allowed is shutdown")
         namespace = joined_namespace(self._namespace, texts.get('namespace', ''))
-        owner = (
-            f'{namespace.rstrip("/")}/{texts.get("name", EXPLORER)}'
-            if (texts.get('pkg'), texts.get('exec')) == ('texture_exploration', EXPLORER)
-            else ''
-        )
         types = ('bool', 'float', 'int')
         respawn, delay_s, retries = (
             typed(texts.get(name, usual), kind, f"'{name}' of <node>")
@@ -670,7 +664,7 @@ class _Reader:
                 executable=self.text(element, 'exec'),
                 name=texts.get('name', ''),
                 namespace=namespace or '/' * ('namespace' in texts),
-                parameters=tuple(self._parameter(item, owner) for item in element.findall('param')),
+                parameters=tuple(self._parameter(item) for item in element.findall('param')),
                 origins={item.get('name', ''): item.get('value', '') for item in element.findall('param')},
                 remappings=tuple((self.text(item, 'from'), self.text(item, 'to')) for item in element.findall('remap')),
                 respawn=respawn,
@@ -681,8 +675,8 @@ class _Reader:
             )
         )
 
-    def _parameter(self, element: Element, owner: str) -> Path | dict[str, Any]:
-        """Return a parameter file, of the node `owner` alone if that is not '', or a name with its value."""
+    def _parameter(self, element: Element) -> Path | dict[str, Any]:
+        """Return a parameter file, or a name with its value."""
         if 'from' not in element.attrib:
             name, kind = self.text(element, 'name'), element.get('type', 'yaml')
             return {name: typed(self.text(element, 'value'), kind, f"the value of <param name='{name}'>")}
@@ -693,5 +687,4 @@ class _Reader:
             if path.parts[-4:-1] == ('texture_bringup', 'config', 'robots'):
                 raise unknown_name(path.stem, [item.stem for item in path.parent.glob('*.yaml')], 'preset')
             raise InvalidLaunch(f"there is no parameter file '{self.text(element, 'from')}'; give the path of one")
-        check_parameter_file(path, owner)
         return path

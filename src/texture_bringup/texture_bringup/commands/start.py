@@ -14,9 +14,10 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
-from dataclasses import asdict
+from dataclasses import asdict, fields, is_dataclass
 from difflib import get_close_matches
 from importlib import import_module
+from importlib.util import find_spec
 from multiprocessing import get_context
 from operator import attrgetter
 from pathlib import Path
@@ -32,7 +33,7 @@ from texture_bringup.launcher import (
     read,
 )
 from texture_core.cli import Command, add_namespace, add_parameters, add_seed, parameters_from, task
-from texture_core.config import find, from_mapping, parameter_sections, parameters_of, reaches
+from texture_core.config import check_parameter_file, find, from_mapping, parameter_sections, parameters_of, reaches
 from texture_core.errors import InvalidLaunch, InvalidParameter, LaunchFailed, UnknownName
 
 # Each command imports what it starts when it runs: a launcher is a child of many programs, and is up sooner without.
@@ -53,42 +54,21 @@ def _launch(options: argparse.Namespace) -> int:
     return Supervisor(nodes, _say, together=options.together).run()
 
 
-# By program: the module with the classes of its parameters, and their names.
-ESTIMATOR = ('texture_estimation.nodes.classifier', 'EstimatorParams')
-EXPLORING = ('ExplorerParams', 'SignalWatchParams', 'TouchParams', 'SafetyLimits', 'SurfacePatch')
-PARAMETERS: Mapping[str, tuple[str, ...]] = {
-    'emulator': ('texture_simulation.emulator', 'EmulatorParams'),
-    'twist_controller': ('texture_simulation.nodes.twist_controller', 'ControllerTopicParams', 'TwistControllerParams'),
-    'ur_controller': ('texture_simulation.devices.ur', 'UrControllerParams'),
-    'rails': ('texture_simulation.nodes.rails', 'RailsLinkParams', 'RailsMachine'),
-    'leap_hand': ('texture_simulation.nodes.leap_hand', 'LeapHandParams'),
-    'sensor': ('texture_drivers.nodes.sensor', 'SensorNodeParams'),
-    'adaptor': ('texture_drivers.nodes.adaptor', 'AdaptorParams'),
-    'explorer': ('texture_exploration.nodes.explorer', *EXPLORING),
-    'feature_extractor': ('texture_features.nodes.feature_extractor', 'ExtractorParams'),
-    'classifier': ESTIMATOR,
-    'roughness_estimator': ESTIMATOR,
-    'record': ('texture_recordings.nodes.record', 'RecordParams'),
-    'replay': ('texture_recordings.nodes.replay', 'ReplayParams'),
-    'dashboard': ('texture_bringup.nodes.dashboard', 'DashboardParams'),
-    'views': ('texture_bringup.nodes.views',),
-}
-Settings = Any  # the parameters of a node as attributes
-
-
 def _call(name: str, *values: Any) -> Any:
     module, _, function = name.partition(':')
     return attrgetter(function)(import_module(module))(*values)
 
 
 # By program: what loads the files and names among its parameters, and refuses what the node would refuse.
-LOADED: Mapping[str, Callable[[Settings], Any]] = {
+LOADED: Mapping[str, Callable[[Any], Any]] = {
     'emulator': lambda given: _call('texture_simulation.scene:load_scene', given.scene).surface(given.surface),
     'classifier': lambda given: given.model and _call('texture_estimation.model:load_model', given.model),
-    'roughness_estimator': lambda given: _call('texture_estimation.roughness:load_roughness_model', given.model),
+    'roughness_estimator': lambda given: (
+        given.model and _call('texture_estimation.roughness:load_roughness_model', given.model)
+    ),
     'feature_extractor': lambda given: _call('texture_features.feature_set:FeatureSet.load', given.recipe),
     'adaptor': lambda given: _call('texture_drivers.adaptor:load_mapping', given.mapping, given.finger),
-    'replay': lambda given: _call('texture_recordings.bags:bags_in', given.bag),
+    'replay': lambda given: given.bag and _call('texture_recordings.bags:bags_in', given.bag),
     'sensor': lambda given: _call('texture_drivers.catalogue:make_sensor', given, time.time_ns),
 }
 OF_ROS = {'use_sim_time', 'start_type_description_service'}  # parameters of every node
@@ -139,44 +119,40 @@ def _check(nodes: Sequence[NodeDescription]) -> list[str]:
 
 
 def _known(node: NodeDescription) -> bool:
-    return node.package.startswith('texture_') and node.executable in PARAMETERS
+    return node.package.startswith('texture_') and find_spec(f'{node.package}.nodes.{node.executable}') is not None
 
 
 def _sections(node: NodeDescription) -> Iterator[tuple[Path | None, str, Mapping[str, Any]]]:
     """Yield what is given to a node in its order: parameter file or None, section, and values by name."""
     for item in node.parameters:
-        if isinstance(item, Mapping):
-            yield None, '', item
-        else:
-            yield from (
-                (item, name, values) for name, values in parameter_sections(item) if reaches(name, node.full_name)
-            )
+        if isinstance(item, Path) and node.executable == EXPLORER:
+            check_parameter_file(item, node.full_name)  # limits in a misnamed section would have no effect
+        found = [('', item)] if isinstance(item, Mapping) else parameter_sections(item)
+        for section, values in found:
+            if not section or reaches(section, node.full_name):
+                yield item if isinstance(item, Path) else None, section, values
 
 
-def _classes(node: NodeDescription) -> list[type]:
-    module, *names = PARAMETERS[node.executable]
-    return [getattr(import_module(module), name) for name in names]
+def _classes(node: NodeDescription, arm: str = '') -> list[type]:
+    """Return the parameter classes that the module of a node names, with those of an arm, or of all: as files serve."""
+    module = vars(import_module(f'{node.package}.nodes.{node.executable}'))
+    own = [one for one in module.values() if isinstance(one, type) and is_dataclass(one)]
+    arms = module.get('ARMS', {})
+    chosen = [find(arms, arm, 'arm')] if arms and arm else arms.values()
+    return [one for one in own if any('description' in item.metadata for item in fields(one))] + [
+        one.Params for one in chosen
+    ]
 
 
 def _names(node: NodeDescription) -> set[str]:
-    """Return the names of all parameters of a node; one file may serve explorers of several arms."""
-    classes = _classes(node)
-    if node.executable == EXPLORER:
-        from texture_exploration.arms.catalogue import ARMS
-
-        classes += [arm.Params for arm in ARMS.values()]
-    return OF_ROS | {item.name for one in classes for item in parameters_of(one)}
+    return OF_ROS | {item.name for one in _classes(node) for item in parameters_of(one)}
 
 
-def _settings(node: NodeDescription, nodes: Sequence[NodeDescription]) -> Settings:
+def _settings(node: NodeDescription, nodes: Sequence[NodeDescription]) -> SimpleNamespace:
     """Return all parameters of a node, each checked where it was given; TextureError for one that no node has."""
     given = list(_sections(node))
-    classes, names = _classes(node), _names(node)
-    if node.executable == EXPLORER:
-        from texture_exploration.arms.catalogue import ARMS
-
-        arm = {name: value for _, _, values in given for name, value in values.items()}.get('arm', 'simulated')
-        classes.append(find(ARMS, str(arm), 'arm').Params)
+    arm = {name: value for _, _, values in given for name, value in values.items()}.get('arm', 'simulated')
+    classes, names = _classes(node, str(arm)), _names(node)
     items = {item.name: item for one in classes for item in parameters_of(one)}
     values: dict[str, Any] = {}
     for path, section, part in given:
