@@ -6,7 +6,12 @@ import math
 
 import pytest
 
+from texture_core.errors import MotionAborted
 from texture_core.types import ExplorationRequest
+from texture_exploration.arms.arm import ArmState
+from texture_exploration.safety import SafetyLimits
+from texture_exploration.stages import LiftStage
+from texture_exploration.touch import TouchParams
 
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.02, force_n=5.0, distance_m=0.03)
 
@@ -58,3 +63,36 @@ def test_a_second_rise_counts_the_force_from_the_first(make_robot):
     press(robot, 0.001)
     robot.explore(SLIDE, lambda state: robot.exploration.stop('enough') if len(robot.phases) > 60 else None)
     assert 3.0 < max(robot.pressed_n) < 10.0
+
+
+def rise(heights_m, force_n):
+    """Lift through heights with a force of each; return the height at which the lift aborts, NaN if it does not."""
+    stage = LiftStage((0.0, 0.0, 0.02), 3.0, TouchParams(), SafetyLimits(tangential_floor_n=1.0))
+    for number, height_m in enumerate(heights_m):
+        arm = ArmState(1 + number * 10_000_000, (0.0, 0.0, height_m), (0.0, 0.0, 0.005), force_n(height_m))
+        if not number:
+            stage.begin(arm.time_ns, arm)
+        try:
+            stage.step(arm.time_ns, arm)
+        except MotionAborted:
+            return height_m
+    return math.nan
+
+
+HEIGHTS_M = [0.0001 * step for step in range(150)]
+
+
+@pytest.mark.parametrize(
+    ('force_n', 'aborts_at_m'),
+    [
+        (lambda height_m: 2.0 + 1000.0 * height_m, 0.0011),  # beyond 1 N of growth, the floor along the surface
+        (
+            lambda height_m: 2.0 + 20_000.0 * height_m,
+            0.0006,
+        ),  # not before half a millimetre: a late arm still comes down
+        (lambda height_m: 2.0 + 400.0 * height_m, math.nan),  # 0.8 N in each 2 mm is drift
+        (lambda height_m: 2.0 - 1000.0 * height_m if height_m < 0.001 else 9.0, math.nan),  # the fall proved the normal
+    ],
+)
+def test_a_lift_ends_where_the_force_has_grown_by_a_newton(force_n, aborts_at_m):
+    assert rise(HEIGHTS_M, force_n) == pytest.approx(aborts_at_m, nan_ok=True)
