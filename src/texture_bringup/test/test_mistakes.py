@@ -3,8 +3,11 @@
 """What a user gets who gives `texture` the wrong thing: exit code 2 and one sentence that says what to do."""
 
 import os
+import re
 import shutil
 from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +16,9 @@ pytestmark = pytest.mark.ros  # some sub-commands are nodes
 
 from texture_bringup.command import main
 from texture_bringup.commands.start import claim, refuse_wrong
-from texture_bringup.launcher import find_launch_file, read
+from texture_bringup.launcher import NodeDescription, find_launch_file, read
+from texture_core.config import parameters_of
+from texture_core.errors import UnknownName
 from texture_core.types import ExplorationState, FingerReceiver, TactileSignal
 from texture_recordings.bags import BagWriter, read_bag
 from texture_simulation.offline import SlidePlan, write_simulated
@@ -27,6 +32,8 @@ def every_second(topic, value):
     return replace(value, samples=value.samples[::2], sampling_rate_hz=500.0, first_sample=value.first_sample // 2)
 
 
+SOURCE = Path(__file__).parents[2]
+DECLARED = re.compile(r'declare\(self, ([A-Z]\w+)')
 # Bags made of that of glass: what becomes of each message; None leaves it out.
 CHANGES = {
     'unlabelled': lambda _, value: replace(value, surface='') if isinstance(value, ExplorationState) else value,
@@ -128,6 +135,19 @@ def test_a_parameter_of_another_arm_and_a_number_as_ros_reads_it_are_allowed(tmp
     )
     given = {'devices': str(tmp_path), 'explorer_params': str(tmp_path / 'robot.yaml')}
     refuse_wrong(read(find_launch_file('ur'), given, os.environ))
+
+
+@pytest.mark.parametrize(
+    'module', sorted(SOURCE.glob('texture_*/texture_*/nodes/[a-z]*.py')), ids=lambda path: path.stem
+)
+def test_every_parameter_that_a_node_declares_may_be_given_to_it(module) -> None:
+    package, base = module.parts[-3], '_estimator' in module.stem
+    text = (module.with_name('classifier.py') if base else module).read_text()
+    classes = [getattr(import_module(f'{package}.nodes.{module.stem}'), name) for name in DECLARED.findall(text)]
+    given = {item.name: item.default for one in classes for item in parameters_of(one) if item.name != 'finger_pipe'}
+    refuse_wrong([NodeDescription(package, module.stem, parameters=(given,))])
+    with pytest.raises(UnknownName, match=f"no parameter 'colour' of {module.stem}"):
+        refuse_wrong([NodeDescription(package, module.stem, parameters=({'colour': 'red'},))])
 
 
 def test_the_models_are_good_and_the_figures_are_written(data, capsys, tmp_path) -> None:

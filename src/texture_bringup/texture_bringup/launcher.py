@@ -633,19 +633,12 @@ class _Reader:
     def _read_include(self, element: Element) -> None:
         path = Path(self.text(element, 'file'))
         given = {self.text(item, 'name'): self.text(item, 'value') for item in element}
-
-        def check(declared: Collection[str]) -> None:
-            for name in given:
-                if name not in declared:
-                    raise unknown_name(name, declared, f'argument of {path.name}')
-
-        root = _root(path)
-        if next(root.iter('include'), None) is None:  # before an argument that is missing instead is named
-            check(_declared(root))
         others, self.declared = self.declared, set()
         self._variables.update(given)
         self.read_file(path)
-        check(self.declared)  # by this file or by one that it includes
+        for name in given:
+            if name not in self.declared:  # by this file or by one that it includes
+                raise unknown_name(name, self.declared, f'argument of {path.name}')
         self.declared |= others
 
     def _read_node(self, element: Element) -> None:

@@ -97,3 +97,10 @@ HEIGHTS_M = [0.0001 * step for step in range(150)]
 )
 def test_a_lift_ends_where_the_force_has_grown_by_a_newton(force_n, aborts_at_m):
     assert rise(HEIGHTS_M, force_n) == pytest.approx(aborts_at_m, nan_ok=True)
+
+
+@pytest.mark.parametrize(('force_n', 'free'), [(0.19, True), (0.21, False), (-0.21, False)])
+def test_a_finger_is_free_below_the_force_of_contact(force_n, free):
+    stage = LiftStage((0.0, 0.0, 0.02), 3.0, TouchParams(contact_force_n=0.2), SafetyLimits())
+    stage.see(ArmState(1, (0.0, 0.0, 0.02), (0.0, 0.0, 0.0), force_n))
+    assert stage.free is free
