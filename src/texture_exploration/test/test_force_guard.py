@@ -12,14 +12,14 @@ DOWN, STOP, BACK = ArmCommand(normal_m_s=-0.01), ArmCommand(), ArmCommand(normal
 STEP_S = 0.01
 
 
-def answers(before_n, after_n):
-    """Come down with forces of `before_n`, abort, and return the commands at those of `after_n`, one each 10 ms."""
+def answers(before_n, after_n, way=DOWN):
+    """Go a way with forces of `before_n`, abort, and return the commands at those of `after_n`, one each 10 ms."""
     guard = ForceGuard(SafetyLimits(force_limit_n=10.0, tangential_floor_n=1.0))
     commands = []
     for number, force_n in enumerate([*before_n, *after_n]):
         arm = ArmState(round(number * STEP_S * 1e9), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), force_n)
         aborted = number >= len(before_n)
-        commands.append(guard.yielding(arm, STOP if aborted else DOWN, aborted))
+        commands.append(guard.yielding(arm, STOP if aborted else way, aborted))
     return commands[len(before_n) :]
 
 
@@ -37,3 +37,9 @@ def answers(before_n, after_n):
 )
 def test_the_way_back_is_as_long_as_it_helps(before_n, after_n, steps_back):
     assert answers(before_n, after_n) == [BACK] * steps_back + [STOP] * (len(after_n) - steps_back)
+
+
+@pytest.mark.parametrize(('there_m_s', 'back_m_s'), [(0.01, 0.02), (0.05, 0.05), (0.5, 0.1)])
+def test_the_way_back_is_as_fast_as_the_way_there_within_bounds(there_m_s, back_m_s):
+    [command] = answers([0.0] * 10, [11.0], ArmCommand(normal_m_s=-there_m_s))
+    assert command.normal_m_s == pytest.approx(back_m_s)

@@ -104,3 +104,11 @@ def test_a_finger_is_free_below_the_force_of_contact(force_n, free):
     stage = LiftStage((0.0, 0.0, 0.02), 3.0, TouchParams(contact_force_n=0.2), SafetyLimits())
     stage.see(ArmState(1, (0.0, 0.0, 0.02), (0.0, 0.0, 0.0), force_n))
     assert stage.free is free
+
+
+def test_a_lift_goes_no_faster_than_5_mm_s_until_the_force_of_a_light_touch_has_fallen():
+    stage = LiftStage((0.0, 0.0, 0.02), 0.01, TouchParams(contact_force_n=0.2), SafetyLimits())
+    arm = ArmState(1, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0)
+    stage.begin(1, arm)
+    assert stage.step(1, arm).normal_m_s == 0.005
+    assert stage.step(2, ArmState(2, (0.0, 0.0, 0.0001), (0.0, 0.0, 0.0), 0.7)).normal_m_s == 0.05
