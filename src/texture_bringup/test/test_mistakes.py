@@ -129,6 +129,12 @@ def test_a_parameter_file_is_refused_before_a_node_starts(launch, lines, sentenc
     assert sentence in refused(['launch', launch, *given], capsys)
 
 
+@pytest.mark.parametrize(('model', 'recipe'), [('fast', 'default'), ('all', 'vibration-and-taxels')])
+def test_a_recipe_with_the_features_of_the_model_is_allowed(model, recipe, data, tmp_path) -> None:
+    given = {'devices': str(tmp_path), 'model': str(data / f'{model}.npz'), 'recipe': recipe}
+    refuse_wrong(read(find_launch_file('emulator'), given, os.environ))
+
+
 def test_a_parameter_of_another_arm_and_a_number_as_ros_reads_it_are_allowed(tmp_path) -> None:
     (tmp_path / 'robot.yaml').write_text(
         '/**/explorer: {ros__parameters: {twist_topic: t, approach_speed_m_s: 5e-3}}\n'
