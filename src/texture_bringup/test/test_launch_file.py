@@ -53,12 +53,12 @@ def test_while_the_files_of_a_launch_are_checked_it_says_so(tmp_path: Path, monk
     monkeypatch.setattr(cli, 'QUIET_S', 0.0)
     replay = NodeDescription('texture_recordings', 'replay', parameters=({'bag': str(tmp_path)},))
     with pytest.raises(InvalidData, match='is not a bag'):
-        refuse_wrong([replay], {str(tmp_path)})
-    assert capsys.readouterr().err.startswith('checking the files that the launch names, ')
+        refuse_wrong([replay])
+    assert capsys.readouterr().err.startswith('checking what the launch was given, ')
 
 
 def test_an_emulator_in_a_users_launch_file_may_leave_its_pipe_as_it_is() -> None:
-    refuse_wrong([NodeDescription('texture_simulation', 'emulator')], set())
+    refuse_wrong([NodeDescription('texture_simulation', 'emulator')])
 
 
 GIVEN = 'if="$(not-equals \'m$(var model)\' m)"'

@@ -3,8 +3,11 @@
 """What a user gets who gives `texture` the wrong thing: exit code 2 and one sentence that says what to do."""
 
 import os
+import re
 import shutil
 from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +15,10 @@ import pytest
 pytestmark = pytest.mark.ros  # some sub-commands are nodes
 
 from texture_bringup.command import main
-from texture_bringup.commands.start import claim
+from texture_bringup.commands.start import claim, refuse_wrong
+from texture_bringup.launcher import NodeDescription, find_launch_file, read
+from texture_core.config import parameters_of
+from texture_core.errors import UnknownName
 from texture_core.types import ExplorationState, FingerReceiver, TactileSignal
 from texture_recordings.bags import BagWriter, read_bag
 from texture_simulation.offline import SlidePlan, write_simulated
@@ -26,6 +32,8 @@ def every_second(topic, value):
     return replace(value, samples=value.samples[::2], sampling_rate_hz=500.0, first_sample=value.first_sample // 2)
 
 
+SOURCE = Path(__file__).parents[2]
+DECLARED = re.compile(r'declare\(self, ([A-Z]\w+)')
 # Bags made of that of glass: what becomes of each message; None leaves it out.
 CHANGES = {
     'unlabelled': lambda _, value: replace(value, surface='') if isinstance(value, ExplorationState) else value,
@@ -45,6 +53,7 @@ def data(tmp_path_factory):
     assert main(['train', 'default', *bags, '-o', str(folder / 'fast')]) == 0
     assert main(['train', 'vibration-and-taxels', *bags, '-o', str(folder / 'all')]) == 0
     os.mkfifo(folder / 'pipe')
+    (folder / 'mine.launch.py').write_text('from launch import LaunchDescription')
     for name, change in CHANGES.items():
         with BagWriter(folder / name) as bag:
             for topic, log_ns, value in read_bag(folder / 'glass'):
@@ -88,7 +97,63 @@ def test_a_second_emulator_is_refused_before_a_bag_is_made(capsys, tmp_path) -> 
 def test_of_two_emulators_that_start_at_once_the_second_starts_no_node(capsys, tmp_path) -> None:
     claim(tmp_path / 'finger')
     said = refused(['launch', 'emulator', f'devices:={tmp_path}'], capsys)
-    assert f"another launch has the emulator at '{tmp_path}/finger'; end it, or give this one another namespace" in said
+    assert (
+        f"another launch has the emulator at '{tmp_path}/finger'; end it, or give this one another argument `namespace`"
+        in said
+    )
+
+
+def test_emulators_in_namespaces_without_the_argument_for_their_devices_start_no_node(capsys, tmp_path) -> None:
+    include = '<include file="$(find-pkg-share texture_bringup)/launch/emulator.launch.xml"/>'
+    groups = [f'<group><push_ros_namespace namespace="{name}"/>{include}</group>' for name in ('left', 'right')]
+    (tmp_path / 'mine.launch.xml').write_text(f'<launch>{"".join(groups)}</launch>')
+    said = refused(['launch', tmp_path / 'mine.launch.xml', f'devices:={tmp_path}'], capsys)
+    assert f"2 emulators of this launch have the pipe '{tmp_path}/finger'; give each" in said
+    assert 'another argument `namespace`' in said
+
+
+@pytest.mark.parametrize('launch', ['emulator', 'ur', 'ros_controllers', 'rails', 'hand'])
+@pytest.mark.parametrize(
+    ('lines', 'sentence'),
+    [
+        ('/**/explorer: {ros__parameters: {max_forse_n: 5.0}}', "no parameter 'max_forse_n' of explorer; did you mean"),
+        ('/**: {ros__parameters: {colour: red}}', "no parameter 'colour' of "),
+        ('/**/explorer: {ros__parameters: {max_force_n: 77}}', 'is 77.0; allowed is 0.01 to 50.0 N'),
+        ('/**/explorer: {ros__parameters: {watch_signal: 1}}', 'is 1; true or false is needed'),
+        ('/**/explorer: {ros__parameters: {min_force_n: 9.0}}', "'min_force_n' is 9; it must be below 'max_force_n'"),
+    ],
+)
+def test_a_parameter_file_is_refused_before_a_node_starts(launch, lines, sentence, capsys, tmp_path) -> None:
+    (tmp_path / 'robot.yaml').write_text(f'{lines}\n')
+    given = [f'devices:={tmp_path}', f'explorer_params:={tmp_path / "robot.yaml"}']
+    assert sentence in refused(['launch', launch, *given], capsys)
+
+
+@pytest.mark.parametrize(('model', 'recipe'), [('fast', 'default'), ('all', 'vibration-and-taxels')])
+def test_a_recipe_with_the_features_of_the_model_is_allowed(model, recipe, data, tmp_path) -> None:
+    given = {'devices': str(tmp_path), 'model': str(data / f'{model}.npz'), 'recipe': recipe}
+    refuse_wrong(read(find_launch_file('emulator'), given, os.environ))
+
+
+def test_a_parameter_of_another_arm_and_a_number_as_ros_reads_it_are_allowed(tmp_path) -> None:
+    (tmp_path / 'robot.yaml').write_text(
+        '/**/explorer: {ros__parameters: {twist_topic: t, approach_speed_m_s: 5e-3}}\n'
+    )
+    given = {'devices': str(tmp_path), 'explorer_params': str(tmp_path / 'robot.yaml')}
+    refuse_wrong(read(find_launch_file('ur'), given, os.environ))
+
+
+@pytest.mark.parametrize(
+    'module', sorted(SOURCE.glob('texture_*/texture_*/nodes/[a-z]*.py')), ids=lambda path: path.stem
+)
+def test_every_parameter_that_a_node_declares_may_be_given_to_it(module) -> None:
+    package, base = module.parts[-3], '_estimator' in module.stem
+    text = (module.with_name('classifier.py') if base else module).read_text()
+    classes = [getattr(import_module(f'{package}.nodes.{module.stem}'), name) for name in DECLARED.findall(text)]
+    given = {item.name: item.default for one in classes for item in parameters_of(one) if item.name != 'finger_pipe'}
+    refuse_wrong([NodeDescription(package, module.stem, parameters=(given,))])
+    with pytest.raises(UnknownName, match=f"no parameter 'colour' of {module.stem}"):
+        refuse_wrong([NodeDescription(package, module.stem, parameters=({'colour': 'red'},))])
 
 
 def test_the_models_are_good_and_the_figures_are_written(data, capsys, tmp_path) -> None:
@@ -143,6 +208,19 @@ def test_the_models_are_good_and_the_figures_are_written(data, capsys, tmp_path)
         ('launch ros_controllers preset:=moveit_serv', "did you mean 'moveit_servo'?"),
         ('launch emulator surface:=glas', "no surface 'glas'; did you mean 'glass'?"),
         ('launch emulator recipe:=defualt', "did you mean 'default'?"),
+        (
+            'launch emulator model:=fast recipe:=vibration-and-taxels',
+            'the model was trained on signal; leave recipe:= out',
+        ),
+        (
+            'launch emulator dashboard:=true dashboard_port:=99999',
+            "'dashboard_port', node 'dashboard': parameter 'port' is",
+        ),
+        ('launch emulator seed:=-1', "launch argument 'seed', node 'emulator': parameter 'seed' is -1; allowed is"),
+        ('launch ur emulated:=false ip:=x device:=x sensor:=tsf8', "no sensor 'tsf8'; did you mean 'tsf85'?"),
+        ('launch ur sensor:=tsf8', "parameter 'sensor' is 'tsf8'; allowed is one of tsf85, "),
+        ('launch emulator explorer_params:=', "there is no parameter file ''; give the path of one"),
+        ('launch mine.launch.py', '`ros2 launch` runs'),
         ('launch emulator model:=nowhere', "there is no model 'nowhere'"),
         ('launch emulator model:=pipe', "there is no card 'pipe.json' of 'pipe'"),
         ('launch replay', 'give bag:=VALUE'),

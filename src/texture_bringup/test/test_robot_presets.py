@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from texture_bringup.commands.start import refuse_wrong
 from texture_bringup.launcher import find_launch_file, read
 from texture_core import config as resources
 from texture_core.config import parameters_of
@@ -145,7 +146,7 @@ def test_limits_in_a_section_that_does_not_reach_the_explorer_are_refused_before
         f"has the section '{shown}', which is not for node '/p/explorer'; allowed are /**, /**/explorer,"
     )
     with pytest.raises(InvalidParameter, match=allowed):
-        read(find_launch_file(robot), {'namespace': 'p', 'explorer_params': str(file)}, os.environ)
+        refuse_wrong(read(find_launch_file(robot), {'namespace': 'p', 'explorer_params': str(file)}, os.environ))
 
 
 @pytest.mark.parametrize(

@@ -9,12 +9,16 @@ packages may declare theirs in the same way.
 
 from __future__ import annotations
 
+import os
+import signal
+
+if __name__ == '__main__':  # Ctrl-C during the imports below ends it without a traceback
+    signal.signal(signal.SIGINT, lambda *_: os._exit(130))
+
 import argparse
 import ast
 import importlib.abc
 import importlib.util
-import os
-import signal
 import sys
 from collections.abc import Mapping, Sequence
 from functools import cache, partial

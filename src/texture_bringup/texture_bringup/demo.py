@@ -173,11 +173,11 @@ ATTEMPTS = 3  # a machine that is busy with something else delays the emulated a
 def demonstrate(out: Path, recipe: str, seed: int, *, dashboard: bool = False) -> bool:
     """Train, recognise and reject on the emulator, and report; return whether every answer was as expected."""
     _clear(out)
+    _train(out, recipe, seed)
     port = _free_port() if dashboard else 0
     address = f'http://127.0.0.1:{port}'
     if dashboard:
         line(f'dashboard: {address} from `Starting the emulator` to `Ending the nodes`')
-    _train(out, recipe, seed)
     section('Starting the emulator: surfaces, arm and sensor are simulated, all other nodes are the real ones')
     with tempfile.TemporaryDirectory(prefix='texture_demo_') as name:
         folder = Path(name)

@@ -26,7 +26,6 @@ from xml.etree.ElementTree import Element
 from texture_core.config import (
     PARSE_ERRORS,
     FileRefused,
-    check_parameter_file,
     executable,
     find,
     find_file,
@@ -132,7 +131,8 @@ class NodeDescription:
     """One node to run.
 
     `namespace` is absolute, or '' where the file names none. Each item of `parameters` is a parameter file or a
-    mapping of names to values; later ones override earlier ones. `environment` is the whole environment of the process.
+    mapping of names to values; later ones override earlier ones. `origins` holds the texts of these values as the file
+    has them, by name. `environment` is the whole environment of the process.
     """
 
     package: str
@@ -140,6 +140,7 @@ class NodeDescription:
     name: str = ''
     namespace: str = ''
     parameters: tuple[Path | Mapping[str, Any], ...] = ()
+    origins: Mapping[str, str] = field(default_factory=dict)
     remappings: tuple[tuple[str, str], ...] = ()
     respawn: bool = False
     respawn_delay_s: float = 0.0
@@ -151,6 +152,11 @@ class NodeDescription:
     def label(self) -> str:
         """Name of the node in the output: its full name as far as the file gives it."""
         return f'{self.namespace.lstrip("/")}/{self.name or self.executable}'.lstrip('/')
+
+    @property
+    def full_name(self) -> str:
+        """Its name in ROS, for a node that bears the name of its program unless the file gives one."""
+        return f'{self.namespace.rstrip("/")}/{self.name or self.executable}'
 
     @property
     def parameter_key(self) -> str:
@@ -511,6 +517,10 @@ def _root(path: Path) -> Element:
     except FileRefused as error:
         raise InvalidLaunch(f"launch file '{path}' is not read: {error}") from error
     except (ElementTree.ParseError, LookupError, ValueError) as error:  # the last two: of its encoding
+        if path.suffix == '.py':
+            raise InvalidLaunch(
+                f"'{path}' is a launch file in Python, which `ros2 launch` runs; XML is needed"
+            ) from error
         raise InvalidLaunch(f"launch file '{path}' is not well-formed XML: {error}") from error
     if root.tag != 'launch':
         raise InvalidLaunch(f"launch file '{path}' begins with <{root.tag}>; <launch> is needed")
@@ -623,19 +633,12 @@ class _Reader:
     def _read_include(self, element: Element) -> None:
         path = Path(self.text(element, 'file'))
         given = {self.text(item, 'name'): self.text(item, 'value') for item in element}
-
-        def check(declared: Collection[str]) -> None:
-            for name in given:
-                if name not in declared:
-                    raise unknown_name(name, declared, f'argument of {path.name}')
-
-        root = _root(path)
-        if next(root.iter('include'), None) is None:  # before an argument that is missing instead is named
-            check(_declared(root))
         others, self.declared = self.declared, set()
         self._variables.update(given)
         self.read_file(path)
-        check(self.declared)  # by this file or by one that it includes
+        for name in given:
+            if name not in self.declared:  # by this file or by one that it includes
+                raise unknown_name(name, self.declared, f'argument of {path.name}')
         self.declared |= others
 
     def _read_node(self, element: Element) -> None:
@@ -643,11 +646,6 @@ class _Reader:
         if (on_exit := texts.get('on_exit', 'shutdown')) != 'shutdown':
             raise InvalidLaunch(f"'on_exit' of <node> is '{on_exit}'; allowed is shutdown")
         namespace = joined_namespace(self._namespace, texts.get('namespace', ''))
-        owner = (
-            f'{namespace.rstrip("/")}/{texts.get("name", EXPLORER)}'
-            if (texts.get('pkg'), texts.get('exec')) == ('texture_exploration', EXPLORER)
-            else ''
-        )
         types = ('bool', 'float', 'int')
         respawn, delay_s, retries = (
             typed(texts.get(name, usual), kind, f"'{name}' of <node>")
@@ -659,7 +657,8 @@ class _Reader:
                 executable=self.text(element, 'exec'),
                 name=texts.get('name', ''),
                 namespace=namespace or '/' * ('namespace' in texts),
-                parameters=tuple(self._parameter(item, owner) for item in element.findall('param')),
+                parameters=tuple(self._parameter(item) for item in element.findall('param')),
+                origins={item.get('name', ''): item.get('value', '') for item in element.findall('param')},
                 remappings=tuple((self.text(item, 'from'), self.text(item, 'to')) for item in element.findall('remap')),
                 respawn=respawn,
                 respawn_delay_s=delay_s,
@@ -669,8 +668,8 @@ class _Reader:
             )
         )
 
-    def _parameter(self, element: Element, owner: str) -> Path | dict[str, Any]:
-        """Return a parameter file, of the node `owner` alone if that is not '', or a name with its value."""
+    def _parameter(self, element: Element) -> Path | dict[str, Any]:
+        """Return a parameter file, or a name with its value."""
         if 'from' not in element.attrib:
             name, kind = self.text(element, 'name'), element.get('type', 'yaml')
             return {name: typed(self.text(element, 'value'), kind, f"the value of <param name='{name}'>")}
@@ -680,6 +679,5 @@ class _Reader:
         if not path.is_file():
             if path.parts[-4:-1] == ('texture_bringup', 'config', 'robots'):
                 raise unknown_name(path.stem, [item.stem for item in path.parent.glob('*.yaml')], 'preset')
-            raise InvalidLaunch(f"there is no parameter file '{path}'; give the path of one")
-        check_parameter_file(path, owner)
+            raise InvalidLaunch(f"there is no parameter file '{self.text(element, 'from')}'; give the path of one")
         return path

@@ -398,15 +398,15 @@ PARAMETER_FILE = (
 )
 
 
-def check_parameter_file(path: Path, node: str = '') -> None:
-    """Refuse a file that ROS cannot read as parameters of nodes; given a full name, also a section of another node."""
+def parameter_sections(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield each section of a parameter file, such as '/**/explorer', with its values; refuse what ROS cannot read."""
 
-    def sections(content: Mapping[Any, Any], above: str = '') -> Iterator[str]:
+    def sections(content: Mapping[Any, Any], above: str = '') -> Iterator[tuple[str, Mapping[str, Any]]]:
         for name, section in content.items():
             if not isinstance(section, Mapping):
                 raise InvalidParameter(f"parameter file '{path}' gives no parameters to a node; {PARAMETER_FILE}")
             if name == 'ros__parameters':
-                yield above
+                yield above, {str(key): value for key, value in section.items()}
             else:
                 yield from sections(section, f'{above}/{str(name).strip("/")}'.rstrip('/'))
 
@@ -414,14 +414,20 @@ def check_parameter_file(path: Path, node: str = '') -> None:
         content = load_yaml(path, 'parameter file')
     except InvalidParameter as error:
         raise InvalidParameter(f'{" ".join(str(error).split())}; {PARAMETER_FILE}') from error
+    return sections({} if content is None else {'': content})
+
+
+def reaches(section: str, node: str) -> bool:
+    """Return whether a section is for a node of this full name; as in ROS, * is one name, ** any number of them."""
+    form = re.escape(section).replace(r'/\*\*', '(/[^/]+)*').replace(r'\*', '[^/]+')
+    return bool(re.fullmatch(form, node))
+
+
+def check_parameter_file(path: Path, node: str = '') -> None:
+    """Refuse a file that ROS cannot read as parameters of nodes; given a full name, also a section of another node."""
     allowed = ('/**', f'/**/{node.rpartition("/")[2]}', node)
-
-    def reaches(section: str) -> bool:  # as ROS matches: * is one name, ** any number of them
-        form = re.escape(section).replace(r'/\*\*', '(/[^/]+)*').replace(r'\*', '[^/]+')
-        return bool(re.fullmatch(form, node))
-
-    for section in sections({} if content is None else {'': content}):
-        if node and not reaches(section):
+    for section, _ in parameter_sections(path):
+        if node and not reaches(section, node):
             raise InvalidParameter(
                 f"parameter file '{path}' has the section '{section}', which is not for node '{node}'; "
                 f'allowed are {", ".join(allowed)}: correct its name, or remove it'

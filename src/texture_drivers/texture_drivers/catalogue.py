@@ -6,7 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
+from typing import Any
 
+from texture_core.config import find
 from texture_core.types import Sensor
 from texture_drivers.anyskin import AnySkin
 from texture_drivers.biotac import LAYOUTS as BIOTACS
@@ -34,3 +36,8 @@ SENSORS: Mapping[str, MakeSensor] = {
     'anyskin': AnySkin,  # AnySkin or ReSkin: 5 magnetometers under a magnetic skin, 100 to 400 Hz
     'sound_card': SoundCard,  # contact microphone or accelerometer on a sound card, at 16 kHz
 }
+
+
+def make_sensor(params: Any, clock: Callable[[], int]) -> Sensor:
+    """Return the sensor that parameters of the sensor node name; nothing is opened."""
+    return find(SENSORS, params.sensor, 'sensor')(params, clock)

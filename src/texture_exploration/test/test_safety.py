@@ -40,6 +40,12 @@ def test_a_force_that_is_too_high_or_unknown_is_a_violation(force):
     assert 'above the limit' in SafetyLimits().force_violation(ArmState(0, REST, REST, force))
 
 
+@pytest.mark.parametrize(('force_n', 'pulls'), [(-9.9, False), (-10.1, True)])
+def test_a_force_that_pulls_by_more_than_the_limit_is_a_violation(force_n, pulls):
+    arm = ArmState(0, REST, REST, force_n)
+    assert ('pulls by more than the limit' in SafetyLimits(force_limit_n=10.0).force_violation(arm)) is pulls
+
+
 def test_a_position_outside_is_named_by_its_axis():
     assert SafetyLimits().outside((0.0, 0.3, 0.0)) == 'y is 0.3000 m, allowed is -0.2 to 0.2 m'
 

@@ -1,14 +1,17 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""How fast the finger may come down."""
+"""How fast the finger may come down, and what it may meet."""
 
 from dataclasses import replace
 
 import pytest
 from table_arm import TableArmParams
 
-from texture_core.errors import MotionRefused
+from texture_core.errors import MotionAborted, MotionRefused
 from texture_core.types import ExplorationRequest
+from texture_exploration.arms.arm import ArmState
+from texture_exploration.safety import SafetyLimits
+from texture_exploration.stages import ApproachStage, GoHomeStage
 from texture_exploration.touch import REACTION_S, TouchParams
 
 TOUCH = TouchParams(approach_speed_m_s=0.1, approach_stiffness_n_m=2000.0)
@@ -53,3 +56,37 @@ def test_a_slide_too_fast_for_a_wall_as_declared_is_refused_before_anything_move
         table.explore(ExplorationRequest('linear_slide', speed_m_s=0.13))
     assert error.value.field == 'speed_m_s'
     assert table.states == []
+
+
+def end(stage, *forces_n):
+    """Return how a stage ends at states with these forces on a finger 10 mm above the surface; '' if it does not."""
+    stage.begin(1, ArmState(1, (0.0, 0.0, 0.01), (0.0, 0.0, 0.0), 0.0))
+    try:
+        for number, (x_n, y_n, z_n) in enumerate(forces_n):
+            arm = ArmState(2 + number, (0.0, 0.0, 0.01), (0.0, 0.0, 0.0), z_n, along_n=(x_n, y_n))
+            if stage.step(arm.time_ns, arm) is None:
+                return 'contact'
+    except MotionAborted as error:
+        return str(error)
+    return ''
+
+
+@pytest.mark.parametrize(
+    ('force_n', 'sentence'),
+    [
+        ((0.0, 0.0, 0.19), ''),
+        ((0.0, 0.0, 0.21), 'contact'),
+        ((1.9, 0.0, 1.0), 'contact'),  # of a finger that slides down a slope
+        ((2.1, 0.0, 1.0), 'met something from the side'),
+        ((0.0, 0.0, -0.21), 'its sign is wrong'),
+    ],
+)
+def test_what_the_finger_comes_down_on_pushes_it_up_within_friction(force_n, sentence):
+    stage = ApproachStage(1.0, TouchParams(contact_force_n=0.2), SafetyLimits(friction_limit=2.0))
+    assert (sentence in end(stage, force_n)) if sentence else end(stage, force_n) == ''
+
+
+@pytest.mark.parametrize(('force_n', 'met'), [(0.69, False), (0.71, True)])
+def test_on_the_way_to_the_start_a_change_by_the_force_of_contact_aborts(force_n, met):
+    stage = GoHomeStage((0.05, 0.0, 0.01), TouchParams(contact_force_n=0.2), SafetyLimits())
+    assert ('met something on the way' in end(stage, (0.0, 0.0, 0.5), (0.0, 0.0, force_n))) is met

@@ -6,7 +6,12 @@ import math
 
 import pytest
 
+from texture_core.errors import MotionAborted
 from texture_core.types import ExplorationRequest
+from texture_exploration.arms.arm import ArmState
+from texture_exploration.safety import SafetyLimits
+from texture_exploration.stages import LiftStage
+from texture_exploration.touch import TouchParams
 
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.02, force_n=5.0, distance_m=0.03)
 
@@ -58,3 +63,52 @@ def test_a_second_rise_counts_the_force_from_the_first(make_robot):
     press(robot, 0.001)
     robot.explore(SLIDE, lambda state: robot.exploration.stop('enough') if len(robot.phases) > 60 else None)
     assert 3.0 < max(robot.pressed_n) < 10.0
+
+
+def rise(heights_m, force_n):
+    """Lift through heights with a force of each; return the height at which the lift aborts, NaN if it does not."""
+    stage = LiftStage((0.0, 0.0, 0.02), 3.0, TouchParams(), SafetyLimits(tangential_floor_n=1.0))
+    for number, height_m in enumerate(heights_m):
+        arm = ArmState(1 + number * 10_000_000, (0.0, 0.0, height_m), (0.0, 0.0, 0.005), force_n(height_m))
+        if not number:
+            stage.begin(arm.time_ns, arm)
+        try:
+            stage.step(arm.time_ns, arm)
+        except MotionAborted:
+            return height_m
+    return math.nan
+
+
+HEIGHTS_M = [0.0001 * step for step in range(150)]
+
+
+@pytest.mark.parametrize(
+    ('force_n', 'aborts_at_m'),
+    [
+        (lambda height_m: 2.0 + 1000.0 * height_m, 0.0011),  # beyond 1 N of growth, the floor along the surface
+        (
+            lambda height_m: 2.0 + 20_000.0 * height_m,
+            0.0006,
+        ),  # not before half a millimetre: a late arm still comes down
+        (lambda height_m: 2.0 + 400.0 * height_m, math.nan),  # 0.8 N in each 2 mm is drift
+        (lambda height_m: 2.0 - 1000.0 * height_m if height_m < 0.001 else 9.0, math.nan),  # the fall proved the normal
+        (lambda height_m: 1.85 + 1000.0 * height_m if height_m else 2.0, 0.0012),  # 0.05 N less proves nothing
+    ],
+)
+def test_a_lift_ends_where_the_force_has_grown_by_a_newton(force_n, aborts_at_m):
+    assert rise(HEIGHTS_M, force_n) == pytest.approx(aborts_at_m, nan_ok=True)
+
+
+@pytest.mark.parametrize(('force_n', 'free'), [(0.19, True), (0.21, False), (-0.21, False)])
+def test_a_finger_is_free_below_the_force_of_contact(force_n, free):
+    stage = LiftStage((0.0, 0.0, 0.02), 3.0, TouchParams(contact_force_n=0.2), SafetyLimits())
+    stage.see(ArmState(1, (0.0, 0.0, 0.02), (0.0, 0.0, 0.0), force_n))
+    assert stage.free is free
+
+
+def test_a_lift_goes_no_faster_than_5_mm_s_until_the_force_of_a_light_touch_has_fallen():
+    stage = LiftStage((0.0, 0.0, 0.02), 0.01, TouchParams(contact_force_n=0.2), SafetyLimits())
+    arm = ArmState(1, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0)
+    stage.begin(1, arm)
+    assert stage.step(1, arm).normal_m_s == 0.005
+    assert stage.step(2, ArmState(2, (0.0, 0.0, 0.0001), (0.0, 0.0, 0.0), 0.7)).normal_m_s == 0.05

@@ -317,4 +317,4 @@ class SignalWatch:
         if not silent:
             return ''
         named = ' and '.join(f"'{topic}'" for topic in silent)
-        return f'no samples on {named} for {max(silent.values()) * 1e3:.0f} ms; check the sensor and its node'
+        return f'no samples on {named} for {max(silent.values()) * 1e3:.0f} ms; check the sensor; its node logs why'

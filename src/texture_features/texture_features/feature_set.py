@@ -472,6 +472,14 @@ def fingerprint_difference(came: str, trained: str) -> str:
     return "features or window length differ; start the feature_extractor with the model's card as its recipe"
 
 
+def recipe_misfit(features: FeatureSet, trained: str) -> str:
+    """Return why no signal gives the features of this recipe the fingerprint of a model, '' if one does."""
+    wanted = _inputs(trained)
+    met = [wanted.get(name, ('0', '0')) for name in features.window_names]
+    layout = tuple((float(rate), tuple(map(str, range(int(channels))))) for rate, channels in met)
+    return fingerprint_difference(features.fingerprint(layout), trained)
+
+
 def _inputs(fingerprint: str) -> dict[str, tuple[str, str]]:
     return {match['topic']: (match['rate'], match['channels']) for match in PART.finditer(fingerprint)}
 

@@ -7,17 +7,25 @@ from __future__ import annotations
 import argparse
 import fcntl
 import os
+import re
 import signal
 import sys
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict
+from contextlib import suppress
+from dataclasses import asdict, fields, is_dataclass
+from difflib import get_close_matches
 from importlib import import_module
+from importlib.util import find_spec
 from multiprocessing import get_context
 from operator import attrgetter
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 from texture_bringup.launcher import (
+    EXPLORER,
     NodeDescription,
     Supervisor,
     find_launch_file,
@@ -25,7 +33,8 @@ from texture_bringup.launcher import (
     read,
 )
 from texture_core.cli import Command, add_namespace, add_parameters, add_seed, parameters_from, task
-from texture_core.errors import LaunchFailed
+from texture_core.config import check_parameter_file, find, from_mapping, parameter_sections, parameters_of, reaches
+from texture_core.errors import InvalidLaunch, InvalidParameter, LaunchFailed, UnknownName
 
 # Each command imports what it starts when it runs: a launcher is a child of many programs, and is up sooner without.
 # ruff: noqa: PLC0415
@@ -41,52 +50,149 @@ def _launch(options: argparse.Namespace) -> int:
     """Run the nodes until they end or Ctrl-C; return 2 if a needed one was started wrongly, 1 if one died, else 0."""
     given = given_arguments(options.arguments)
     nodes = read(find_launch_file(options.file), given, os.environ)
-    refuse_wrong(nodes, set(given.values()))
+    refuse_wrong(nodes)
     return Supervisor(nodes, _say, together=options.together).run()
 
 
-# By program: the function that loads the first of these parameters, and refuses what the node would refuse.
-LOOKED_AT = {
-    'emulator': ('texture_simulation.scene', 'load_scene', 'scene', 'surface'),
-    'classifier': ('texture_estimation.model', 'load_model', 'model'),
-    'roughness_estimator': ('texture_estimation.roughness', 'load_roughness_model', 'model'),
-    'feature_extractor': ('texture_features.feature_set', 'FeatureSet.load', 'recipe'),
-    'adaptor': ('texture_drivers.adaptor', 'load_mapping', 'mapping'),
-    'replay': ('texture_recordings.bags', 'bags_in', 'bag'),
+def _call(name: str, *values: Any) -> Any:
+    module, _, function = name.partition(':')
+    return attrgetter(function)(import_module(module))(*values)
+
+
+# By program: what loads the files and names among its parameters, and refuses what the node would refuse.
+LOADED: Mapping[str, Callable[[Any], Any]] = {
+    'emulator': lambda given: _call('texture_simulation.scene:load_scene', given.scene).surface(given.surface),
+    'classifier': lambda given: given.model and _call('texture_estimation.model:load_model', given.model),
+    'roughness_estimator': lambda given: (
+        given.model and _call('texture_estimation.roughness:load_roughness_model', given.model)
+    ),
+    'feature_extractor': lambda given: _call('texture_features.feature_set:FeatureSet.load', given.recipe),
+    'adaptor': lambda given: _call('texture_drivers.adaptor:load_mapping', given.mapping, given.finger),
+    'replay': lambda given: given.bag and _call('texture_recordings.bags:bags_in', given.bag),
+    'sensor': lambda given: _call('texture_drivers.catalogue:make_sensor', given, time.time_ns),
 }
+OF_ROS = {'use_sim_time', 'start_type_description_service'}  # parameters of every node
 
 
-def _look_at(module: str, load: str, value: str, *surfaces: str) -> None:
-    """Load what a node would load, and the surfaces of a scene; TextureError if they cannot be."""
-    loaded = attrgetter(load)(import_module(module))(value)
-    for surface in surfaces:
-        loaded.surface(surface)
-
-
-def refuse_wrong(nodes: Sequence[NodeDescription], given: set[str]) -> None:
-    """Raise, before any node starts, the error of a node of the suite for a value that was given, or its pipe.
+def refuse_wrong(nodes: Sequence[NodeDescription]) -> None:
+    """Raise, before any node starts, what a node of the suite would refuse of its parameters and files, or its pipe.
 
     In a separate process: a launcher that stays needs none of their libraries.
     """
-    wanted: list[tuple[str, ...]] = []
-    pipes = set()
-    for node in sorted(nodes, key=lambda node: node.executable == 'feature_extractor'):  # its recipe may be the model's
-        module, load, *names = LOOKED_AT.get(node.executable, ('', ''))
-        known = {name: value for one in node.parameters if isinstance(one, Mapping) for name, value in one.items()}
-        values = [str(known.get(name, '')) for name in names]
-        if node.executable == 'emulator' and 'finger_pipe' in known:  # one uses it; else a recorder has made its bag
-            wanted.append(('texture_core.types', 'FingerReceiver', str(known['finger_pipe'])))
-            pipes.add(Path(str(known['finger_pipe'])).expanduser())
-        if all(values) and given.intersection(values):
-            wanted.append((module, load, *values))
-    if wanted:
-        with ProcessPoolExecutor(1, get_context('fork')) as pool:
-            checks = [pool.submit(_look_at, *one) for one in wanted]
-            with task('checking the files that the launch names'):  # behind the fork, which copies no thread
-                for check in checks:
-                    check.result()
+    with ProcessPoolExecutor(1, get_context('fork')) as pool:
+        checked = pool.submit(_check, nodes)
+        with task('checking what the launch was given'):  # behind the fork, which copies no thread
+            pipes = checked.result()
     for pipe in pipes:
-        claim(pipe)
+        if pipes.count(pipe) > 1:
+            raise InvalidLaunch(
+                f"{pipes.count(pipe)} emulators of this launch have the pipe '{pipe}'; give each included launch file "
+                'another argument `namespace`, after which the folder of its devices is named: push_ros_namespace '
+                'alone does not name it'
+            )
+        claim(Path(pipe).expanduser())
+
+
+def _check(nodes: Sequence[NodeDescription]) -> list[str]:
+    """Raise the first error in the parameters of some nodes and in their files; return the pipes of the emulators."""
+    settings = [(node, _settings(node, nodes)) for node in nodes if _known(node)]
+    loaded: dict[str, dict[tuple[str, str], Any]] = {}  # by program and the topic of the features
+    # The recipe may be that of the model, which is looked at first.
+    for node, given in sorted(settings, key=lambda one: one[0].executable == 'feature_extractor'):
+        features = dict(node.remappings).get('features', 'features')
+        if node.executable in LOADED:
+            loaded.setdefault(node.executable, {})[node.namespace, features] = LOADED[node.executable](given)
+    for place, extracted in loaded.get('feature_extractor', {}).items():
+        for program in ('classifier', 'roughness_estimator'):
+            if model := loaded.get(program, {}).get(place):
+                misfit = _call('texture_features.feature_set:recipe_misfit', extracted, model.feature_set)
+                if misfit:
+                    raise InvalidLaunch(
+                        f"the recipe does not fit model '{model.name}': {misfit}; leave recipe:= out, and it is that "
+                        'of the model'
+                    )
+    emulators = [node for node, _ in settings if node.executable == 'emulator']
+    pipes = [str(part['finger_pipe']) for node in emulators for _, _, part in _sections(node) if 'finger_pipe' in part]
+    for pipe in pipes:  # one uses it; else a recorder has made its bag
+        _call('texture_core.types:FingerReceiver', pipe).close()
+    return pipes
+
+
+def _known(node: NodeDescription) -> bool:
+    return node.package.startswith('texture_') and find_spec(f'{node.package}.nodes.{node.executable}') is not None
+
+
+def _sections(node: NodeDescription) -> Iterator[tuple[Path | None, str, Mapping[str, Any]]]:
+    """Yield what is given to a node in its order: parameter file or None, section, and values by name."""
+    for item in node.parameters:
+        if isinstance(item, Path) and node.executable == EXPLORER:
+            check_parameter_file(item, node.full_name)  # limits in a misnamed section would have no effect
+        found = [('', item)] if isinstance(item, Mapping) else parameter_sections(item)
+        for section, values in found:
+            if not section or reaches(section, node.full_name):
+                yield item if isinstance(item, Path) else None, section, values
+
+
+def _classes(node: NodeDescription, arm: str = '') -> list[type]:
+    """Return the parameter classes that the module of a node names, with those of an arm, or of all: as files serve."""
+    module = vars(import_module(f'{node.package}.nodes.{node.executable}'))
+    own = [one for one in module.values() if isinstance(one, type) and is_dataclass(one)]
+    arms = module.get('ARMS', {})
+    chosen = [find(arms, arm, 'arm')] if arms and arm else arms.values()
+    return [one for one in own if any('description' in item.metadata for item in fields(one))] + [
+        one.Params for one in chosen
+    ]
+
+
+def _names(node: NodeDescription) -> set[str]:
+    return OF_ROS | {item.name for one in _classes(node) for item in parameters_of(one)}
+
+
+def _settings(node: NodeDescription, nodes: Sequence[NodeDescription]) -> SimpleNamespace:
+    """Return all parameters of a node, each checked where it was given; TextureError for one that no node has."""
+    given = list(_sections(node))
+    arm = {name: value for _, _, values in given for name, value in values.items()}.get('arm', 'simulated')
+    classes, names = _classes(node, str(arm)), _names(node)
+    items = {item.name: item for one in classes for item in parameters_of(one)}
+    values: dict[str, Any] = {}
+    for path, section, part in given:
+        for name, value in part.items():
+            where = f"parameter file '{path}'" if path else _argument(node, name)
+            if name in items:
+                try:
+                    values[name] = items[name].check(_number(items[name].type, value))
+                except InvalidParameter as error:
+                    raise InvalidParameter(f"{where}, node '{node.label}': {error}") from error
+            elif name not in names and not name.startswith('qos_overrides.'):
+                readers = [one for one in nodes if path in one.parameters and reaches(section, one.full_name)] or [node]
+                if all(_known(one) and name not in _names(one) for one in readers):
+                    near = get_close_matches(name, set().union(*map(_names, readers)), n=1)
+                    hint = f"; did you mean '{near[0]}'?" if near else ';'
+                    raise UnknownName(
+                        f"{where}: no parameter '{name}' of {', '.join(one.label for one in readers)}{hint} correct or "
+                        'remove it, docs/reference/parameters.md has all names'
+                    )
+    settings = SimpleNamespace()
+    for one in classes:
+        made: object = from_mapping(
+            one, {item.name: values[item.name] for item in parameters_of(one) if item.name in values}, node.label
+        )
+        vars(settings).update(vars(made))
+    return settings
+
+
+def _argument(node: NodeDescription, name: str) -> str:
+    """Return where a launch file has the value of a parameter: its argument, or the node."""
+    found = re.findall(r'\$\(var (\w+)\)', node.origins.get(name, ''))
+    return f"launch argument '{found[0]}'" if found else 'launch file'
+
+
+def _number(kind: type, value: Any) -> Any:
+    """Return a number such as 1e-3, which ROS reads in a file and YAML takes for a text."""
+    if kind is float and isinstance(value, str):
+        with suppress(ValueError):
+            return float(value)
+    return value
 
 
 def claim(pipe: Path) -> None:
@@ -96,7 +202,8 @@ def claim(pipe: Path) -> None:
         fcntl.flock(os.open(f'{pipe}.lock', os.O_RDWR | os.O_CREAT, 0o600), fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:
         raise LaunchFailed(
-            f"another launch has the emulator at '{pipe}'; end it, or give this one another namespace"
+            f"another launch has the emulator at '{pipe}'; end it, or give this one another argument `namespace`: "
+            'push_ros_namespace alone does not name the folder of its devices'
         ) from error
 
 

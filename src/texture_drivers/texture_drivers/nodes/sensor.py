@@ -15,7 +15,7 @@ from sensor_msgs.msg import Imu
 from std_srvs.srv import Trigger
 from texture_msgs import msg
 
-from texture_core.config import find, param
+from texture_core.config import param
 from texture_core.errors import TextureError
 from texture_core.ros import (
     SENSOR_QOS,
@@ -31,7 +31,7 @@ from texture_core.ros import (
     to_stamp,
 )
 from texture_core.types import NANOSECONDS, Phase, Sensor, TactileSignal
-from texture_drivers.catalogue import SENSORS
+from texture_drivers.catalogue import make_sensor
 from texture_drivers.health import ChannelWatch, SensorHealth, TareParams
 from texture_drivers.sensor import SensorParams, SensorReader
 
@@ -133,7 +133,7 @@ class SensorNode(PatientLifecycleNode):
             self._reader = None
 
     def _make(self, params: SensorNodeParams) -> Sensor:
-        return find(SENSORS, params.sensor, 'sensor')(params, lambda: self.get_clock().now().nanoseconds)
+        return make_sensor(params, lambda: self.get_clock().now().nanoseconds)
 
     def _destroy_publishers(self) -> None:
         for publisher in (*self._topics.values(), *self._baselines.values(), *self._imus.values()):

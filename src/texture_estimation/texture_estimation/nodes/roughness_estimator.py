@@ -9,7 +9,7 @@ from typing import Any
 from texture_msgs import msg
 
 from texture_core.ros import run
-from texture_estimation.nodes.classifier import EstimatorNode
+from texture_estimation.nodes.classifier import EstimatorNode, EstimatorParams  # noqa: F401  # its parameters
 from texture_estimation.roughness import NO_MODEL, RoughnessAccumulator, load_roughness_model
 
 

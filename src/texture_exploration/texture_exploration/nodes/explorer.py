@@ -223,8 +223,8 @@ class ExplorerNode(PatientLifecycleNode):
         try:
             step()
         except TextureError as error:
-            more = '; the next request tries again' if self._autostart else ''
-            self.get_logger().error(f'{error}{more}')
+            if not ENDING.is_set():  # a wait that Ctrl-C ended is no fault
+                self.get_logger().error(f'{error}{"; the next request tries again" * self._autostart}')
             return False
         return True
 
