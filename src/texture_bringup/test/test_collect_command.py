@@ -13,7 +13,7 @@ import pytest
 
 from texture_bringup.command import main
 from texture_bringup.commands import explore
-from texture_bringup.operator import ExplorationResult
+from texture_bringup.operator import ExplorationResult, Interrupted
 from texture_core.errors import (
     CollectionError,
     ExplorationError,
@@ -60,10 +60,10 @@ class Explorer:
 def collected(monkeypatch, tmp_path):
     """Collect with an explorer, by a recorder that makes a bag, and may not start, end or lose samples."""
 
-    def collected(explorer, recorder_ends=False, start=None, losses='', ends_late='', **params):
+    def collected(explorer, recorder_ends=False, start=None, losses='', ends_late='', wait_for=None, **params):
         recording = Mock(end=ends_late)
         recording.check.side_effect = InvalidData('the recorder died with exit code 1') if recorder_ends else None
-        recording.wait_for.side_effect = losses if isinstance(losses, list) else lambda _name: losses
+        recording.wait_for.side_effect = wait_for or (losses if isinstance(losses, list) else lambda _name: losses)
 
         @contextmanager
         def recorder(_operator, bag, _namespace):
@@ -141,6 +141,28 @@ def test_a_bag_in_the_folder_that_cannot_be_used_is_refused_before_the_robot_mov
 
 
 DONE = ExplorationError.NONE, 'id'
+
+
+ENDED = 'the exploration has ended: the motion was completed'
+
+
+@pytest.mark.parametrize('ended', [False, True])
+def test_a_slide_that_was_completed_before_ctrl_c_is_kept_once_it_is_on_the_disk(collected, tmp_path, ended):
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # as the command does
+    written = []
+
+    def write(name):
+        if not ended:
+            signal.raise_signal(signal.SIGINT)
+        written.append(name)
+        return ''
+
+    try:
+        end, bag = collected(Explorer(Interrupted(ENDED, 'id') if ended else DONE), wait_for=write)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert (end.error, end.slides, bag, written) == (CollectionError.CANCELLED, 1, tmp_path / 'cork', ['id'])
+    assert end.message == (f'stopped: {ENDED}' if ended else 'stopped')
 
 
 def test_ctrl_c_while_the_recorder_starts_leaves_no_bag(collected, tmp_path):

@@ -25,7 +25,7 @@ import numpy as np
 
 from texture_bringup.feed import roughness_text, texture_text
 from texture_bringup.launcher import Child
-from texture_bringup.operator import ExplorationResult, Operator, Progress
+from texture_bringup.operator import ExplorationResult, Interrupted, Operator, Progress, uninterrupted
 from texture_core.cli import USER_ERROR, Command, add_namespace, add_parameters, parameters_from, task
 from texture_core.config import find
 from texture_core.errors import (
@@ -326,19 +326,27 @@ def collect_surface(
         with suppress(KeyboardInterrupt), recorder(operator, bag, namespace) as recording:
             stopped = operator.watch_stops()
 
-            def explore(request: ExplorationRequest) -> tuple[ExplorationError, str]:
+            def keep(exploration_id: str) -> None:
                 nonlocal made, losses
+                with uninterrupted():  # a slide that was made is kept
+                    lost = recording.wait_for(exploration_id)
+                    made += 1
+                if lost != losses:
+                    losses = lost
+                    _print_progress(losses, made)
+
+            def explore(request: ExplorationRequest) -> tuple[ExplorationError, str]:
                 recording.check()
                 try:
                     explored = operator.explore(request, stopped=stopped)
                 except (MotionRefused, MotionAborted) as error:
                     return error.error, str(error)
+                except Interrupted as stop:
+                    if stop.completed:
+                        keep(stop.completed)
+                    raise
                 if explored.success:
-                    lost = recording.wait_for(explored.exploration_id)
-                    made += 1
-                    if lost != losses:
-                        losses = lost
-                        _print_progress(losses, made)
+                    keep(explored.exploration_id)
                 return explored.error, explored.message
 
             end = collection.collect(plan, params, explore, partial(_evaluate_bag, bag, surface), _print_progress)
