@@ -106,16 +106,16 @@ def test_a_bag_without_any_slide_is_removed_and_the_sentence_says_so(collected, 
     assert end.message.endswith('; no slide was made, so no bag is kept') != kept
 
 
-def test_touches_begin_when_the_recorder_writes_what_the_nodes_send(two_surfaces: Path, tmp_path: Path) -> None:
+def test_touches_begin_when_the_recorder_writes_what_every_node_sends(two_surfaces: Path, tmp_path: Path) -> None:
     [recorded, _] = sorted((two_surfaces / 'bags').iterdir())
-    streams = {name: value for name, _, value in read_bag(recorded, explore.RECORDED)}
-    bag = tmp_path / 'cork'
-    assert not explore.records(bag, lambda: None)
+    streams = {name: value for name, _, value in read_bag(recorded, ('signal', 'exploration'))}
+    bag, wanted = tmp_path / 'cork', {'finger0/signal', 'signal', 'exploration'}
+    assert not explore.records(bag, 'left', wanted, lambda: None)
     writer = BagWriter(bag)
-    for name, complete in (('signal', False), ('exploration', True)):
-        writer.write(f'/left/{name}', streams[name], 1)
+    for name in ('finger0/signal', 'finger1/signal', 'exploration', 'signal'):
+        writer.write(f'/left/{name}', streams[name.rpartition('/')[2]], 1)
         writer.flush()
-        assert explore.records(bag, lambda: None) == complete
+        assert explore.records(bag, 'left', wanted, lambda: None) == (name == 'signal')
     writer.close()
 
 

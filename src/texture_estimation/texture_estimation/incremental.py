@@ -57,12 +57,18 @@ class IncrementalClassifier:
         self._numbers = stored_numbers(path) if path is not None else []  # of the files, one for each added slide
         self._recent_windows: OrderedDict[str, list[Array]] = OrderedDict()
         self._conditions: dict[str, RunningConditions] = {}  # of the same explorations
+        self._aborted: set[str] = set()  # of them
         self._sliding: str | None = None  # the exploration whose end has not come
 
     def begin(self, exploration_id: str) -> None:
         """Note an exploration as the newest one: if it ends before it slides, no earlier one takes its place."""
         self._sliding = None
         self._recent_windows_of(exploration_id)
+
+    def abort(self, exploration_id: str) -> None:
+        """Note an exploration as aborted, so that it is not added."""
+        self._recent_windows_of(exploration_id)
+        self._aborted.add(exploration_id)
 
     def observe(self, vector: FeatureVector) -> None:
         """Keep a window, so that its exploration can be added."""
@@ -82,6 +88,11 @@ class IncrementalClassifier:
         name = exploration_id or next(reversed(self._recent_windows), '')
         if name == self._sliding:
             raise ChangeRefused(f"exploration '{name}' still runs; add it once it has ended", ChangeError.NO_SLIDE)
+        if name in self._aborted:
+            raise ChangeRefused(
+                f"exploration '{name}' was aborted, so its slide is not whole; explore again, and add that slide",
+                ChangeError.NO_SLIDE,
+            )
         self._refuse_without_window(name)
         self._refuse_second_time(name, label)
         added_slide = AddedSlide(label, name, np.stack(self._recent_windows[name]), self._conditions[name].get())
@@ -105,6 +116,7 @@ class IncrementalClassifier:
         while len(self._recent_windows) > EXPLORATIONS:
             oldest, _ = self._recent_windows.popitem(last=False)
             del self._conditions[oldest]
+            self._aborted.discard(oldest)
         return windows
 
     def _refuse_without_window(self, exploration_id: str) -> None:
@@ -118,8 +130,8 @@ class IncrementalClassifier:
             if exploration_id in self._recent_windows
             else f"no exploration '{exploration_id}' is among the last {EXPLORATIONS}"
         )
-        usable = ', '.join(name for name, windows in self._recent_windows.items() if windows) or 'none'
-        raise ChangeRefused(f'{reason}. Can be added: {usable}', ChangeError.NO_SLIDE)
+        usable = (name for name, windows in self._recent_windows.items() if windows and name not in self._aborted)
+        raise ChangeRefused(f'{reason}. Can be added: {", ".join(usable) or "none"}', ChangeError.NO_SLIDE)
 
     def _refuse_second_time(self, exploration_id: str, label: str) -> None:
         """Refuse an exploration that was added before: counted twice, one slide would raise the confidence."""

@@ -286,7 +286,6 @@ def _identify(options: argparse.Namespace) -> int:
 RECIPE = 'default'  # whose features distinguish the places
 GAPS = 'windows with a gap are left out of features and training; if many are, reduce the load of the computer'
 WRITTEN_S = 60.0  # within which a slide is on the disk: the recorder may be behind
-RECORDED = ('signal', 'exploration')
 RECORDER_S = 60.0  # to start, on a busy machine
 PATCH = ('patch_x_low_m', 'patch_x_high_m', 'patch_y_low_m', 'patch_y_high_m')
 LEAST_SPEED_M_S = 0.002  # of every explorer
@@ -435,25 +434,28 @@ class RecorderProcess(Child):
 def recorder(operator: Operator, bag: Path, namespace: str) -> Iterator[RecorderProcess]:
     """Record a bag of what the explorer watches, once it holds what the nodes send."""
     [topics] = operator.parameters('explorer', ('signal_topics',))
+    ours = f'/{namespace}/'.replace('//', '/')
+    wanted = {*(topic.removeprefix(ours) for topic in topics.split()), 'exploration'}
     with (
         tempfile.TemporaryDirectory() as log,
         RecorderProcess(bag, namespace, Path(log) / 'record.log', topics) as recording,
     ):
         operator.wait_until(
-            lambda: records(bag, recording.check),
+            lambda: records(bag, namespace, wanted, recording.check),
             RECORDER_S,
-            f'the recorder has received no {" and ".join(RECORDED)} yet; look at the output of sensor and explorer',
+            f'the recorder has not received {" and ".join(sorted(wanted))} yet; look at the output of sensor and '
+            'explorer',
         )
         yield recording
 
 
-def records(bag: Path, check: Callable[[], None]) -> bool:
-    """Return whether a bag that is being recorded holds all of `RECORDED`: the idle explorer reports once a second."""
+def records(bag: Path, namespace: str, wanted: set[str], check: Callable[[], None]) -> bool:
+    """Return whether a bag that is being recorded holds all topics: the idle explorer reports once a second."""
     from texture_recordings.bags import topics_in
 
     check()
     with unfinished_bags(), suppress(InvalidData):  # nothing is written yet
-        return set(RECORDED) <= {name.rpartition('/')[2] for name in topics_in(bag)}
+        return wanted <= set(topics_in(bag, namespace))
     return False
 
 
