@@ -60,7 +60,7 @@ class Explorer:
 def collected(monkeypatch, tmp_path):
     """Collect with an explorer, by a recorder that makes a bag, and may not start, end or lose samples."""
 
-    def collected(explorer, recorder_ends=False, start=None, losses='', ends_late='', wait_for=None, **params):
+    def collected(explorer, *, recorder_ends=False, start=None, losses='', ends_late='', wait_for=None, **params):
         recording = Mock(end=ends_late)
         recording.check.side_effect = InvalidData('the recorder died with exit code 1') if recorder_ends else None
         recording.wait_for.side_effect = wait_for or (losses if isinstance(losses, list) else lambda _name: losses)

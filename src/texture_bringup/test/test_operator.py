@@ -141,7 +141,7 @@ def test_ctrl_c_after_the_motion_was_completed_tells_its_id():
         operators.Operator(domain_id=DOMAIN, guard=press_ctrl_c) as operator,
     ):
         operator.wait_for_explorer(30.0)
-        with pytest.raises(operators.Interrupted, match='^the exploration has ended: completed$') as interrupted:
+        with pytest.raises(operators.Interrupted, match=r'^the exploration has ended: completed$') as interrupted:
             operator.explore(ExplorationRequest('linear_slide'))
     assert interrupted.value.completed == 'a'
 

@@ -185,6 +185,7 @@ def places_of(channels: tuple[str, ...]) -> list[tuple[int, int]]:
 # --------------------
 # Estimates as texts for people.
 
+SEPARATOR, UNKNOWN = ' · ', '–'
 REASONS = {Rejection.NOVEL: 'it resembles no trained texture', Rejection.OUTSIDE_TRAINING: 'outside the training'}
 
 
@@ -210,6 +211,36 @@ def texture_text(estimate: TextureEstimate) -> str:
     reason, note = REASONS.get(estimate.rejection, in_words(estimate.rejection)), estimate.message
     why = note if note.startswith(reason) else '; '.join(filter(None, (reason, note)))
     return f'unknown (nearest: {nearest}): {why}'
+
+
+def evidence_text(estimate: TextureEstimate) -> str:
+    """Return what a label rests on, and why it is rejected; without a label the message."""
+    parts = [
+        f'confidence {estimate.confidence:.2f}' if estimate.label and math.isfinite(estimate.confidence) else '',
+        f'{estimate.windows} windows, {estimate.evidence_s:.1f} s' if estimate.windows else '',
+        f'rejected: {in_words(estimate.rejection)}' if estimate.label and not estimate.accepted else '',
+        '' if estimate.label else estimate.message,
+    ]
+    return SEPARATOR.join(filter(None, parts))
+
+
+def quantity(value: float, digits: int, unit: str) -> str:
+    """Return a number as text, '–' if it is unknown."""
+    return f'{value:.{digits}f} {unit}' if math.isfinite(value) else UNKNOWN
+
+
+def number_text(name: str, unit: str, low: float, high: float) -> str:
+    """Return a number of a motion with its range: 'speed (m/s), 0.002 to 0.25'."""
+    what = f'{name.partition("_")[0]} ({unit})' if unit not in ('', name) else name
+    return f'{what}, {low:g} to {high:g}{" within the workspace" * (unit == "m")}'
+
+
+def past_text(seen: Mapping[str, Any]) -> str:
+    """Return the summary of an exploration in one line."""
+    over = f'(over {seen["surface"]})' if seen.get('surface') else ''
+    grade = f'roughness {seen["grade"]:.1f}' if seen.get('grade') is not None else ''
+    parts = (seen.get('motion'), seen.get('phase'), seen.get('label') or 'no label', over, grade, seen['id'])
+    return SEPARATOR.join(filter(None, parts))
 
 
 def roughness_text(estimate: RoughnessEstimate) -> str:
@@ -244,6 +275,7 @@ class Feed:
         self._model = ModelInfo(0)
         self._roughness = RoughnessEstimate(0, '')
         self._began_s = math.inf  # the first frame
+        self._may_press = False  # since an exploration that was not seen to end with a lifted finger
         self.recorded = False  # the messages come from a bag, in which no node can report
         self.recording = ''  # folder that is being recorded to
         self.working = ''  # last message of a sub-command that the page has started
@@ -274,6 +306,8 @@ class Feed:
             self._texture = TextureEstimate(state.stamp_ns, state.exploration_id)
             self._roughness = RoughnessEstimate(state.stamp_ns, state.exploration_id)
         self._state = state
+        # An explorer that takes control again knows nothing of its finger; the last exploration has told of it.
+        self._may_press = not state.lifted and (bool(state.exploration_id) or self._may_press)
         if state.exploration_id:
             seen = {'motion': state.motion, 'phase': state.phase.value, 'surface': state.surface}
             self._note(state.exploration_id, seen)
@@ -309,18 +343,21 @@ class Feed:
     def frame(self, time_s: float) -> dict[str, Any]:
         """Return everything that is shown at a time of the monotonic clock, s, as JSON can carry it."""
         self._began_s = min(self._began_s, time_s)
-        # As after the restart of an explorer that was killed; one that has not explored yet touches nothing.
-        unknown = self._state.phase is Phase.IDLE and not self._state.lifted and bool(self._past)
+        unknown = self._may_press and self._state.phase is Phase.IDLE  # as after the restart of one that was killed
         return {
             'warning': MAY_PRESS if unknown else '',
             'signal': self._signal(),
             'spectrum': self._spectrum(),
             'taxels': self._image(),
-            'state': _shown(self._state),
+            'state': {
+                **_shown(self._state),
+                'speed': quantity(self._state.speed_m_s, 3, 'm/s'),
+                'force': quantity(self._state.force_n, 2, 'N'),
+            },
             'texture': self._evidence(time_s),
-            'roughness': {**_shown(self._roughness), 'text': roughness_text(self._roughness)},
+            'roughness': _graded(self._roughness),
             'lights': self.node_statuses.shown(time_s),
-            'past': list(reversed(self._past.values())),
+            'past': [{'id': name, 'text': past_text(one)} for name, one in reversed(self._past.items())],
             'recording': self.recording,
             'working': self.working,
         }
@@ -368,11 +405,24 @@ class Feed:
         return {
             **_shown(estimate),
             'accepted': estimate.accepted,
-            'missing': missing,
+            'shown': f'{estimate.label}{"?" * (not estimate.accepted)}' if estimate.label else UNKNOWN,
+            'note': missing or evidence_text(estimate),
             'text': missing or texture_text(estimate),
             'labels': [label for _, label in pairs],
             'probabilities': _numbers(probability for probability, _ in pairs),
         }
+
+
+def _graded(estimate: RoughnessEstimate) -> dict[str, Any]:
+    """Return a roughness estimate for a gauge: its grade, that as a fraction of the scale, and a note."""
+    known = estimate.valid and math.isfinite(estimate.grade)
+    return {
+        **_shown(estimate),
+        'shown': f'{estimate.grade:.1f}' if known else UNKNOWN,
+        'fraction': min(max((estimate.grade - 1.0) / 4.0, 0.0), 1.0) if known else 0.0,
+        'note': f'± {quantity(estimate.grade_std, 1, "").strip()}' if known else estimate.message,
+        'text': roughness_text(estimate),
+    }
 
 
 def _shown(values: Any) -> dict[str, Any]:

@@ -161,9 +161,9 @@ def test_an_aborted_slide_is_refused_by_name_and_others_can_be_added(model, silk
     measured(classifier, silk[:1], 'stopped')
     classifier.abort('stopped')
     for name in ('', 'stopped'):
-        with pytest.raises(ChangeRefused, match="'stopped' was aborted, .*; explore again, and add that slide$"):
+        with pytest.raises(ChangeRefused, match=r"'stopped' was aborted, .*; explore again, and add that slide$"):
             classifier.add('silk', name)
-    with pytest.raises(ChangeRefused, match='Can be added: e1$'):
+    with pytest.raises(ChangeRefused, match=r'Can be added: e1$'):
         classifier.add('silk', 'e9')
     assert classifier.add('silk', 'e1') == len(silk)
 

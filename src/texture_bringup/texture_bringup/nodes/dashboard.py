@@ -22,7 +22,7 @@ from std_srvs.srv import Trigger
 from texture_msgs import msg
 
 from texture_bringup.dashboard import Access, Recorder, Serving, make_app
-from texture_bringup.feed import FRAME_PERIOD_S, Feed
+from texture_bringup.feed import FRAME_PERIOD_S, Feed, number_text
 from texture_bringup.operator import NOT_STOPPED, STOP_S, Operator, subscribe
 from texture_core.config import folder, from_mapping, param
 from texture_core.errors import InvalidData, InvalidParameter, LaunchFailed, MotionRefused
@@ -164,7 +164,7 @@ class DashboardNode(Node):
         motions: dict[str, list[dict[str, Any]]] = {name: [] for name in self._info.motions}
         for one in self._info.numbers:
             number = {'name': one.field, 'default': one.default_value, 'low': one.low, 'high': one.high}
-            motions[one.motion].append({**number, 'unit': one.unit})
+            motions[one.motion].append({**number, 'text': number_text(one.field, one.unit, one.low, one.high)})
         return motions
 
     # ROS
