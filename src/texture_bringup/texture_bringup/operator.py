@@ -440,13 +440,8 @@ class Operator:
         )
         missing = "no node publishes on 'features'; is the feature_extractor running?"
         self.wait_until(lambda: self._node.count_publishers('features') > 0, FEATURES_DEADLINE_S, missing)
-        self._settle()
+        self._complete(Future(), DISCOVERY_S)
         return vectors
-
-    def _settle(self) -> None:
-        """Wait until other processes have discovered what this process has."""
-        settled_s = time.monotonic() + DISCOVERY_S
-        self.wait_until(lambda: time.monotonic() > settled_s, 2 * DISCOVERY_S, '')
 
     def _ask_classifier(self, kind: Any, name: str, request: Any) -> Any:
         """Return the answer of a service of the classifier that succeeded."""

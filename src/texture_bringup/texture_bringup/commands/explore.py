@@ -145,18 +145,8 @@ OUTCOMES = {ACCEPTED: 'accepted', REJECTED: 'rejected', ABORTED: 'aborted', USER
 
 def as_json(result: ExplorationResult) -> dict[str, Any]:
     """Return a result for JSON: unknown numbers are null."""
-    values = {
-        'outcome': OUTCOMES[exit_code(result)],
-        'error': result.error.name.lower(),
-        'message': result.message,
-        'exploration_id': result.exploration_id,
-        'texture': {
-            **asdict(result.texture),
-            'rejection': result.texture.rejection.name.lower(),
-            'labels': result.labels,
-        },
-        'roughness': asdict(result.roughness),
-    }
+    values = {'outcome': OUTCOMES[exit_code(result)], **asdict(result), 'error': result.error.name.lower()}
+    values['texture'] |= {'rejection': result.texture.rejection.name.lower(), 'labels': values.pop('labels')}
     known: dict[str, Any] = json.loads(json.dumps(values), parse_constant=lambda _: None)
     return known
 
@@ -318,7 +308,7 @@ def collect_surface(
             _features_of(folder)  # what cannot be used is refused before the robot moves
         except TextureError as error:
             raise InvalidData(f"{error}; or move that bag out of '{folder}'") from error
-    bag = folder / collection.next_bag([one.name for one in folder.iterdir()], surface)
+    bag = collection.next_bag(folder, surface)
     made, losses = 0, ''
     end = collection.CollectionEnd(CollectionError.CANCELLED, 'stopped', 0)  # by Ctrl-C while the recorder starts
     try:
@@ -373,7 +363,7 @@ def _print_progress(sentence: str, slides: int) -> None:
     print(f'{slides} slide{"s" * (slides != 1)}: {sentence}', flush=True)
 
 
-def _evaluate_bag(bag: Path, surface: str, _slides: int) -> collection.PlaceAccuracy:
+def _evaluate_bag(bag: Path, surface: str) -> collection.PlaceAccuracy:
     """Evaluate all bags of the folder of a bag."""
     from texture_evaluation.collection import evaluate_places
 
@@ -500,7 +490,7 @@ def _collect(options: argparse.Namespace) -> int:
             folder.rmdir()
     kept = f"; {end.slides} slide{'s' * (end.slides != 1)} in '{bag}'" if bag else ''
     if end.error not in (CollectionError.NONE, CollectionError.BOUND_MISSED):
-        following = folder / next_bag([one.name for one in folder.glob('*')], options.surface)
+        following = next_bag(folder, options.surface)
         kept += f"; continue at other places with --seed {params.seed + 1}, into '{following}'"
     print(f'{end.message}{kept}', file=sys.stderr if end.error else sys.stdout)
     if end.error is CollectionError.CANCELLED:
