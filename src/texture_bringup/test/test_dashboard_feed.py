@@ -131,10 +131,10 @@ def test_numbers_are_shown_with_their_unit_and_unknown_ones_as_a_dash() -> None:
     frame = feed.frame(0.0)
     assert (frame['state']['speed'], frame['state']['force']) == ('0.050 m/s', '1.00 N')
     roughness = frame['roughness']
-    assert (roughness['shown'], roughness['note'], roughness['fraction']) == ('2.0', '± 0.5', 0.25)
+    assert (roughness['shown'], roughness['note']) == ('2.0', '± 0.5')
     feed.on_roughness(RoughnessEstimate(3, 'a', message='too short'))
     roughness = feed.frame(0.0)['roughness']
-    assert (roughness['shown'], roughness['note'], roughness['fraction']) == ('–', 'too short', 0.0)
+    assert (roughness['shown'], roughness['note']) == ('–', 'too short')
     assert Feed().frame(0.0)['state']['force'] == '–'
     assert number_text('speed_m_s', 'm/s', 0.002, 0.25) == 'speed (m/s), 0.002 to 0.25'
     assert number_text('distance_m', 'm', 0.01, 1.0) == 'distance (m), 0.01 to 1 within the workspace'

@@ -224,23 +224,15 @@ def evidence_text(estimate: TextureEstimate) -> str:
     return SEPARATOR.join(filter(None, parts))
 
 
-def quantity(value: float, digits: int, unit: str) -> str:
+def quantity(value: float, digits: int, unit: str = '') -> str:
     """Return a number as text, '–' if it is unknown."""
-    return f'{value:.{digits}f} {unit}' if math.isfinite(value) else UNKNOWN
+    return f'{value:.{digits}f} {unit}'.rstrip() if math.isfinite(value) else UNKNOWN
 
 
 def number_text(name: str, unit: str, low: float, high: float) -> str:
     """Return a number of a motion with its range: 'speed (m/s), 0.002 to 0.25'."""
     what = f'{name.partition("_")[0]} ({unit})' if unit not in ('', name) else name
     return f'{what}, {low:g} to {high:g}{" within the workspace" * (unit == "m")}'
-
-
-def past_text(seen: Mapping[str, Any]) -> str:
-    """Return the summary of an exploration in one line."""
-    over = f'(over {seen["surface"]})' if seen.get('surface') else ''
-    grade = f'roughness {seen["grade"]:.1f}' if seen.get('grade') is not None else ''
-    parts = (seen.get('motion'), seen.get('phase'), seen.get('label') or 'no label', over, grade, seen['id'])
-    return SEPARATOR.join(filter(None, parts))
 
 
 def roughness_text(estimate: RoughnessEstimate) -> str:
@@ -266,7 +258,7 @@ class Feed:
     """Collect the messages of the nodes and return frames. Used from one thread at a time."""
 
     def __init__(self) -> None:
-        self._past: dict[str, dict[str, Any]] = {}  # summaries by exploration, the newest last
+        self._past: dict[str, dict[str, str]] = {}  # summaries by exploration, the newest last
         self.node_statuses = NodeStatuses()
         self._ring = Ring(SIGNAL_S)
         self._taxels = Taxels()
@@ -309,13 +301,13 @@ class Feed:
         # An explorer that takes control again knows nothing of its finger; the last exploration has told of it.
         self._may_press = not state.lifted and (bool(state.exploration_id) or self._may_press)
         if state.exploration_id:
-            seen = {'motion': state.motion, 'phase': state.phase.value, 'surface': state.surface}
-            self._note(state.exploration_id, seen)
+            over = f'(over {state.surface})' if state.surface else ''
+            self._note(state.exploration_id, {'motion': state.motion, 'phase': state.phase.value, 'surface': over})
 
     def on_texture(self, estimate: TextureEstimate) -> None:
         """Take an estimate; one of an exploration before the present one only enters its summary."""
         if estimate.exploration_id in self._past:
-            self._note(estimate.exploration_id, {'label': label_text(estimate)})
+            self._note(estimate.exploration_id, {'label': label_text(estimate) or 'no label'})
         if estimate.exploration_id == self._texture.exploration_id or not self._texture.exploration_id:
             self._texture = estimate
 
@@ -326,13 +318,15 @@ class Feed:
     def on_roughness(self, estimate: RoughnessEstimate) -> None:
         """Take an estimate; one of an exploration before the present one only enters its summary."""
         if estimate.exploration_id in self._past:
-            self._note(estimate.exploration_id, {'grade': _number(estimate.grade)})
+            grade = f'roughness {estimate.grade:.1f}' if math.isfinite(estimate.grade) else ''
+            self._note(estimate.exploration_id, {'grade': grade})
         if estimate.exploration_id == self._roughness.exploration_id or not self._roughness.exploration_id:
             self._roughness = estimate
 
-    def _note(self, exploration_id: str, seen: Mapping[str, Any]) -> None:
+    def _note(self, exploration_id: str, seen: Mapping[str, str]) -> None:
         """Add to the summary of an exploration; the oldest is forgotten."""
-        self._past[exploration_id] = {**self._past.get(exploration_id, {}), **seen, 'id': exploration_id}
+        new = {'motion': '', 'phase': '', 'label': 'no label', 'surface': '', 'grade': '', 'id': exploration_id}
+        self._past[exploration_id] = {**self._past.get(exploration_id, new), **seen}
         if len(self._past) > MAX_EXPLORATIONS:
             del self._past[next(iter(self._past))]
 
@@ -343,21 +337,30 @@ class Feed:
     def frame(self, time_s: float) -> dict[str, Any]:
         """Return everything that is shown at a time of the monotonic clock, s, as JSON can carry it."""
         self._began_s = min(self._began_s, time_s)
-        unknown = self._may_press and self._state.phase is Phase.IDLE  # as after the restart of one that was killed
+        state, grade = self._state, self._roughness
+        unknown = self._may_press and state.phase is Phase.IDLE  # as after the restart of one that was killed
         return {
             'warning': MAY_PRESS if unknown else '',
             'signal': self._signal(),
             'spectrum': self._spectrum(),
             'taxels': self._image(),
             'state': {
-                **_shown(self._state),
-                'speed': quantity(self._state.speed_m_s, 3, 'm/s'),
-                'force': quantity(self._state.force_n, 2, 'N'),
+                **_shown(state),
+                'speed': quantity(state.speed_m_s, 3, 'm/s'),
+                'force': quantity(state.force_n, 2, 'N'),
             },
             'texture': self._evidence(time_s),
-            'roughness': _graded(self._roughness),
+            'roughness': {
+                **_shown(grade),
+                'shown': quantity(grade.grade, 1) if grade.valid else UNKNOWN,
+                'note': f'± {quantity(grade.grade_std, 1)}' if grade.valid else grade.message,
+                'text': roughness_text(grade),
+            },
             'lights': self.node_statuses.shown(time_s),
-            'past': [{'id': name, 'text': past_text(one)} for name, one in reversed(self._past.items())],
+            'past': [
+                {'id': name, 'text': SEPARATOR.join(filter(None, seen.values()))}
+                for name, seen in reversed(self._past.items())
+            ],
             'recording': self.recording,
             'working': self.working,
         }
@@ -411,18 +414,6 @@ class Feed:
             'labels': [label for _, label in pairs],
             'probabilities': _numbers(probability for probability, _ in pairs),
         }
-
-
-def _graded(estimate: RoughnessEstimate) -> dict[str, Any]:
-    """Return a roughness estimate for a gauge: its grade, that as a fraction of the scale, and a note."""
-    known = estimate.valid and math.isfinite(estimate.grade)
-    return {
-        **_shown(estimate),
-        'shown': f'{estimate.grade:.1f}' if known else UNKNOWN,
-        'fraction': min(max((estimate.grade - 1.0) / 4.0, 0.0), 1.0) if known else 0.0,
-        'note': f'± {quantity(estimate.grade_std, 1, "").strip()}' if known else estimate.message,
-        'text': roughness_text(estimate),
-    }
 
 
 def _shown(values: Any) -> dict[str, Any]:

@@ -64,11 +64,7 @@ class CollectionParams:
     seed: int = param(0, 'Seed of places and directions.', low=0)
 
     def __post_init__(self) -> None:
-        for low, high in (
-            ('places', 'most_places'),
-            ('speed_low_m_s', 'speed_high_m_s'),
-            ('force_low_n', 'force_high_n'),
-        ):
+        for low, high in (('places', 'most_places'), *USUAL):
             if getattr(self, low) > getattr(self, high) > 0:  # 0 is chosen later
                 raise InvalidParameter(
                     f"'{low}' is {getattr(self, low):g}; it must not be above '{high}', {getattr(self, high):g}"

@@ -262,7 +262,8 @@ function showTexture(texture) {
 
 function showRoughness(roughness) {
   if (roughness.model) at('roughness').hidden = false;
-  at('gauge-arc').style.strokeDasharray = `${100 * roughness.fraction} 100`;
+  const fraction = roughness.valid ? Math.min(1, Math.max(0, (roughness.grade - 1) / 4)) : 0;
+  at('gauge-arc').style.strokeDasharray = `${100 * fraction} 100`;
   at('grade').textContent = roughness.shown;
   at('roughness-note').textContent = roughness.note;
 }

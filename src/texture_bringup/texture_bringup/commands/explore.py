@@ -367,8 +367,7 @@ def _evaluate_bag(bag: Path, surface: str) -> collection.PlaceAccuracy:
     """Evaluate all bags of the folder of a bag."""
     from texture_evaluation.collection import evaluate_places
 
-    with unfinished_bags():
-        return evaluate_places(_features_of(bag.parent), surface)
+    return evaluate_places(_features_of(bag.parent), surface)
 
 
 def _features_of(folder: Path) -> LabelledFeatures:
@@ -378,16 +377,6 @@ def _features_of(folder: Path) -> LabelledFeatures:
 
     feature_set = FeatureSet.load(RECIPE)
     return SlideDataset.from_bags([folder], topics=feature_set.topics).features(feature_set)
-
-
-@contextmanager
-def unfinished_bags() -> Iterator[None]:
-    """Read bags that are still recorded, without the warning that they have no end."""
-    BAGS_LOG.disabled = True
-    try:
-        yield
-    finally:
-        BAGS_LOG.disabled = False
 
 
 class RecorderProcess(Child):
@@ -426,17 +415,21 @@ def recorder(operator: Operator, bag: Path, namespace: str) -> Iterator[Recorder
     [topics] = operator.parameters('explorer', ('signal_topics',))
     ours = f'/{namespace}/'.replace('//', '/')
     wanted = {*(topic.removeprefix(ours) for topic in topics.split()), 'exploration'}
-    with (
-        tempfile.TemporaryDirectory() as log,
-        RecorderProcess(bag, namespace, Path(log) / 'record.log', topics) as recording,
-    ):
-        operator.wait_until(
-            lambda: records(bag, namespace, wanted, recording.check),
-            RECORDER_S,
-            f'the recorder has not received {" and ".join(sorted(wanted))} yet; look at the output of sensor and '
-            'explorer',
-        )
-        yield recording
+    BAGS_LOG.disabled = True  # a bag that is still recorded has no end, of which reading would warn
+    try:
+        with (
+            tempfile.TemporaryDirectory() as log,
+            RecorderProcess(bag, namespace, Path(log) / 'record.log', topics) as recording,
+        ):
+            operator.wait_until(
+                lambda: records(bag, namespace, wanted, recording.check),
+                RECORDER_S,
+                f'the recorder has not received {" and ".join(sorted(wanted))} yet; look at the output of sensor and '
+                'explorer',
+            )
+            yield recording
+    finally:
+        BAGS_LOG.disabled = False
 
 
 def records(bag: Path, namespace: str, wanted: set[str], check: Callable[[], None]) -> bool:
@@ -444,7 +437,7 @@ def records(bag: Path, namespace: str, wanted: set[str], check: Callable[[], Non
     from texture_recordings.bags import topics_in
 
     check()
-    with unfinished_bags(), suppress(InvalidData):  # nothing is written yet
+    with suppress(InvalidData):  # nothing is written yet
         return wanted <= set(topics_in(bag, namespace))
     return False
 

@@ -67,7 +67,9 @@ class DashboardNode(Node):
         self._serving = Serving(
             make_app(self, access, folder('texture_bringup', 'config/dashboard')), params.host, params.port
         )
-        self._subscribe()
+        subscribe(self, self._feed, self._on_bad)
+        qos = quality_of_service('explorer_info')
+        self.create_subscription(msg.ExplorerInfo, 'explorer_info', partial(setattr, self, '_info'), qos)
         self.create_timer(FRAME_PERIOD_S, self._show)
         Diagnostics(self, self._report)
         # On the terminal alone, as a log would keep the token.
@@ -168,11 +170,6 @@ class DashboardNode(Node):
         return motions
 
     # ROS
-
-    def _subscribe(self) -> None:
-        subscribe(self, self._feed, self._on_bad)
-        qos = quality_of_service('explorer_info')
-        self.create_subscription(msg.ExplorerInfo, 'explorer_info', partial(setattr, self, '_info'), qos)
 
     def _on_bad(self, error: InvalidData) -> None:
         self._bad += 1
