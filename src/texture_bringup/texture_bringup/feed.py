@@ -106,9 +106,7 @@ def envelope(samples: NDArray[np.float64], points: int) -> tuple[NDArray[np.floa
     if points == 0:
         return np.zeros(0), np.zeros(0)
     edges = np.linspace(0, len(samples), points, endpoint=False).astype(int)
-    low = np.fmin.reduceat(samples, edges)
-    high = np.fmax.reduceat(samples, edges)
-    return low, high
+    return np.fmin.reduceat(samples, edges), np.fmax.reduceat(samples, edges)
 
 
 def spectrum_db(samples: NDArray[np.float64], bins: int) -> NDArray[np.float64]:
@@ -294,20 +292,24 @@ class Feed:
 
     def on_state(self, state: ExplorationState) -> None:
         """Take the state of the finger; a new exploration begins without evidence."""
-        if state.exploration_id and state.exploration_id not in self._past:
-            self._texture = TextureEstimate(state.stamp_ns, state.exploration_id)
-            self._roughness = RoughnessEstimate(state.stamp_ns, state.exploration_id)
+        name = state.exploration_id
+        if name and name not in self._past:
+            self._texture, self._roughness = (
+                TextureEstimate(state.stamp_ns, name),
+                RoughnessEstimate(state.stamp_ns, name),
+            )
+            self._past[name] = {'motion': '', 'phase': '', 'label': 'no label', 'surface': '', 'grade': '', 'id': name}
+            if len(self._past) > MAX_EXPLORATIONS:
+                del self._past[next(iter(self._past))]
         self._state = state
         # An explorer that takes control again knows nothing of its finger; the last exploration has told of it.
-        self._may_press = not state.lifted and (bool(state.exploration_id) or self._may_press)
-        if state.exploration_id:
-            over = f'(over {state.surface})' if state.surface else ''
-            self._note(state.exploration_id, {'motion': state.motion, 'phase': state.phase.value, 'surface': over})
+        self._may_press = not state.lifted and (bool(name) or self._may_press)
+        over = f'(over {state.surface})' if state.surface else ''
+        self._note(name, {'motion': state.motion, 'phase': state.phase.value, 'surface': over})
 
     def on_texture(self, estimate: TextureEstimate) -> None:
         """Take an estimate; one of an exploration before the present one only enters its summary."""
-        if estimate.exploration_id in self._past:
-            self._note(estimate.exploration_id, {'label': label_text(estimate) or 'no label'})
+        self._note(estimate.exploration_id, {'label': label_text(estimate) or 'no label'})
         if estimate.exploration_id == self._texture.exploration_id or not self._texture.exploration_id:
             self._texture = estimate
 
@@ -317,18 +319,15 @@ class Feed:
 
     def on_roughness(self, estimate: RoughnessEstimate) -> None:
         """Take an estimate; one of an exploration before the present one only enters its summary."""
-        if estimate.exploration_id in self._past:
-            grade = f'roughness {estimate.grade:.1f}' if math.isfinite(estimate.grade) else ''
-            self._note(estimate.exploration_id, {'grade': grade})
+        grade = f'roughness {estimate.grade:.1f}' if math.isfinite(estimate.grade) else ''
+        self._note(estimate.exploration_id, {'grade': grade})
         if estimate.exploration_id == self._roughness.exploration_id or not self._roughness.exploration_id:
             self._roughness = estimate
 
     def _note(self, exploration_id: str, seen: Mapping[str, str]) -> None:
-        """Add to the summary of an exploration; the oldest is forgotten."""
-        new = {'motion': '', 'phase': '', 'label': 'no label', 'surface': '', 'grade': '', 'id': exploration_id}
-        self._past[exploration_id] = {**self._past.get(exploration_id, new), **seen}
-        if len(self._past) > MAX_EXPLORATIONS:
-            del self._past[next(iter(self._past))]
+        """Add to the summary of an exploration that is listed."""
+        if exploration_id in self._past:
+            self._past[exploration_id].update(seen)
 
     def newest(self) -> tuple[ExplorationState, TextureEstimate, RoughnessEstimate]:
         """Return the newest state and estimates of the present exploration."""

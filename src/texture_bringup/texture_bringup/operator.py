@@ -274,10 +274,9 @@ class Operator:
         """Wait until the sensor delivers samples."""
         batches: list[msg.TactileSignal] = []
         subscription = self._node.create_subscription(msg.TactileSignal, 'signal', batches.append, SENSOR_QOS)
+        missing = "no samples arrive on 'signal'; is the sensor connected?"
         try:
-            self.wait_until(
-                lambda: bool(batches), deadline_s, "no samples arrive on 'signal'; is the sensor connected?"
-            )
+            self.wait_until(lambda: bool(batches), deadline_s, missing)
         finally:
             self._node.destroy_subscription(subscription)
 

@@ -67,7 +67,6 @@ class IncrementalClassifier:
 
     def abort(self, exploration_id: str) -> None:
         """Note an exploration as aborted, so that it is not added."""
-        self._recent_windows_of(exploration_id)
         self._aborted.add(exploration_id)
 
     def observe(self, vector: FeatureVector) -> None:

@@ -80,6 +80,23 @@ def test_a_finger_is_checked_corrected_and_found_as_trained_again(trained):
     assert load_model(model).feature_set == plain.feature_set
 
 
+def test_a_jerk_of_the_arm_is_no_other_finger_and_three_decibels_are(trained):
+    model, slides = trained
+    store_reference(model, TOPICS, slides[:2], REQUEST)
+    for slide in slides[2:]:
+        batches = slide.signals['signal']
+        jerk = [replace(one, samples=one.samples.copy()) for one in batches]
+        middle = jerk[len(jerk) // 2]
+        level = np.median(middle.samples, axis=0)
+        part = slice(len(middle.samples) // 2, len(middle.samples) // 2 + round(0.2 * middle.sampling_rate_hz))
+        middle.samples[part] = level + 10.0 * (middle.samples[part] - level)
+        as_trained, sentence = check(model, replace(slide, signals={'signal': jerk}))
+        assert as_trained, sentence
+        for decibels in (-3.0, 3.0):
+            as_trained, sentence = check(model, louder(slide, 10.0 ** (decibels / 20.0)))
+            assert not as_trained, sentence
+
+
 def test_a_slide_with_lost_samples_is_refused_with_advice_for_an_operator(trained):
     model, slides = trained
     *before, last = slides[2].signals['signal']

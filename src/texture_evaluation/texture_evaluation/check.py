@@ -18,6 +18,7 @@ from texture_estimation.training import DAY_SUFFIX, adapted
 from texture_evaluation.train import training_examples
 from texture_features.correction import (
     CORRECTION,
+    GAIN_DB,
     RESPONSE_DB,
     SLIDE_NUMBERS,
     Correction,
@@ -159,8 +160,8 @@ def _claim(found: Mapping[str, InputComparison]) -> str:
     known = all(one.rest_is_known for one in found.values())
     claim = 'the finger is as trained' if known else f'gain and response are as trained, {UNMEASURED}'
     numbers = ', '.join(
-        f'{topic} gain {np.median(one.gain_db):+.1f} dB, response within {np.abs(one.response_db).max():.1f} dB and '
-        f'{one.uneven_db:.1f} dB rms ({RESPONSE_DB:g} dB rms is allowed)'
+        f'{topic} gain {np.median(one.gain_db):+.1f} dB (±{GAIN_DB:g} dB is allowed), response within '
+        f'{np.abs(one.response_db).max():.1f} dB and {one.uneven_db:.1f} dB rms ({RESPONSE_DB:g} dB rms is allowed)'
         + (f', noise × {one.noise_ratio:.1f}, drift {one.drift:.1f} rms' if one.rest_is_known else '')
         for topic, one in found.items()
     )

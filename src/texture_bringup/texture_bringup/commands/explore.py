@@ -302,7 +302,6 @@ def collect_surface(
         )
     patch = collection.Patch(low_x, high_x, low_y, high_y)
     plan = collection.PlacePlan(surface, params, patch, (low_n, high_n), (LEAST_SPEED_M_S, high_m_s))
-    folder.mkdir(parents=True, exist_ok=True)
     if any(map(is_bag, folder.iterdir())):
         try:
             _features_of(folder)  # what cannot be used is refused before the robot moves
