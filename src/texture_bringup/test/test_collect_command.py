@@ -23,6 +23,7 @@ from texture_core.errors import (
     TextureError,
 )
 from texture_core.types import RoughnessEstimate, TextureEstimate
+from texture_evaluation import collection
 from texture_evaluation.collection import CollectionEnd, CollectionParams, PlaceAccuracy
 from texture_recordings.bags import BagWriter, read_bag
 
@@ -178,7 +179,8 @@ def test_a_recorder_that_is_not_discovered_leaves_no_bag(collected, tmp_path):
 
 
 def test_lost_samples_are_reported_once_and_at_the_end(collected, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(explore, '_evaluate_bag', lambda *_: PlaceAccuracy(2, 0))
+    monkeypatch.setattr(explore, '_features_of', lambda _folder: None)
+    monkeypatch.setattr(collection, 'evaluate_places', lambda *_: PlaceAccuracy(2, 0))
     end, bag = collected(Explorer(DONE, DONE), losses='2970 samples lost', places=2)
     assert (end.error, end.slides, bag) == (CollectionError.NONE, 2, tmp_path / 'cork')
     assert '; 2970 samples lost; windows with a gap are left out of features and training; ' in end.message
@@ -195,7 +197,8 @@ def test_a_slide_that_the_recorder_has_not_written_does_not_count(collected, tmp
 
 
 def test_a_recorder_that_ends_in_the_last_evaluation_is_reported(collected, monkeypatch):
-    monkeypatch.setattr(explore, '_evaluate_bag', lambda *_: PlaceAccuracy(2, 0))
+    monkeypatch.setattr(explore, '_features_of', lambda _folder: None)
+    monkeypatch.setattr(collection, 'evaluate_places', lambda *_: PlaceAccuracy(2, 0))
     end, _ = collected(Explorer(DONE, DONE), ends_late=KILLED, places=2)
     assert (end.error, end.slides) == (CollectionError.NOT_RECORDED, 2)
     assert end.message.startswith(f'{KILLED}; 2 places')

@@ -213,13 +213,11 @@ def texture_text(estimate: TextureEstimate) -> str:
 
 def evidence_text(estimate: TextureEstimate) -> str:
     """Return what a label rests on, and why it is rejected; without a label the message."""
-    parts = [
-        f'confidence {estimate.confidence:.2f}' if estimate.label and math.isfinite(estimate.confidence) else '',
-        f'{estimate.windows} windows, {estimate.evidence_s:.1f} s' if estimate.windows else '',
-        f'rejected: {in_words(estimate.rejection)}' if estimate.label and not estimate.accepted else '',
-        '' if estimate.label else estimate.message,
-    ]
-    return SEPARATOR.join(filter(None, parts))
+    seen = f'{estimate.windows} windows, {estimate.evidence_s:.1f} s' if estimate.windows else ''
+    if not estimate.label:
+        return SEPARATOR.join(filter(None, (seen, estimate.message)))
+    rejected = '' if estimate.accepted else f'rejected: {in_words(estimate.rejection)}'
+    return SEPARATOR.join(filter(None, (f'confidence {quantity(estimate.confidence, 2)}', seen, rejected)))
 
 
 def quantity(value: float, digits: int, unit: str = '') -> str:
@@ -249,7 +247,6 @@ SIGNAL_S, SPECTRUM_S, LEVEL_S = 2.0, 0.5, 0.1
 POINTS, BINS = 240, 128
 MAX_LABELS = 200
 DIGITS = 4
-IDLE = ExplorationState(0, '', '', Phase.IDLE)
 
 
 class Feed:
@@ -260,7 +257,7 @@ class Feed:
         self.node_statuses = NodeStatuses()
         self._ring = Ring(SIGNAL_S)
         self._taxels = Taxels()
-        self._state = IDLE
+        self._state = ExplorationState(0, '', '', Phase.IDLE)
         self._texture = TextureEstimate(0, '')
         self._model = ModelInfo(0)
         self._roughness = RoughnessEstimate(0, '')
@@ -337,9 +334,8 @@ class Feed:
         """Return everything that is shown at a time of the monotonic clock, s, as JSON can carry it."""
         self._began_s = min(self._began_s, time_s)
         state, grade = self._state, self._roughness
-        unknown = self._may_press and state.phase is Phase.IDLE  # as after the restart of one that was killed
         return {
-            'warning': MAY_PRESS if unknown else '',
+            'warning': MAY_PRESS * (self._may_press and state.phase is Phase.IDLE),  # an explorer that was killed
             'signal': self._signal(),
             'spectrum': self._spectrum(),
             'taxels': self._image(),

@@ -87,11 +87,6 @@ class IncrementalClassifier:
         name = exploration_id or next(reversed(self._recent_windows), '')
         if name == self._sliding:
             raise ChangeRefused(f"exploration '{name}' still runs; add it once it has ended", ChangeError.NO_SLIDE)
-        if name in self._aborted:
-            raise ChangeRefused(
-                f"exploration '{name}' was aborted, so its slide is not whole; explore again, and add that slide",
-                ChangeError.NO_SLIDE,
-            )
         self._refuse_without_window(name)
         self._refuse_second_time(name, label)
         added_slide = AddedSlide(label, name, np.stack(self._recent_windows[name]), self._conditions[name].get())
@@ -119,13 +114,15 @@ class IncrementalClassifier:
         return windows
 
     def _refuse_without_window(self, exploration_id: str) -> None:
-        if self._recent_windows.get(exploration_id):
+        if self._recent_windows.get(exploration_id) and exploration_id not in self._aborted:
             return
         if not self._recent_windows:
             raise ChangeRefused('no exploration was classified with this model; explore first', ChangeError.NO_SLIDE)
         reason = (
-            f"exploration '{exploration_id}' has no usable window: it ended before its slide or a window of it, its "
-            'samples were lost, or its features do not fit the model'
+            f"exploration '{exploration_id}' was aborted, so its slide is not whole; explore again"
+            if exploration_id in self._aborted
+            else f"exploration '{exploration_id}' has no usable window: it ended before its slide or a window of it, "
+            'its samples were lost, or its features do not fit the model'
             if exploration_id in self._recent_windows
             else f"no exploration '{exploration_id}' is among the last {EXPLORATIONS}"
         )

@@ -84,8 +84,7 @@ class InputStatistics:
         segments = np.stack([samples[start : start + length] for start in starts])
         segments = (segments - segments.mean(axis=1, keepdims=True)) * np.hanning(length)[:, None]
         power = np.abs(np.fft.rfft(segments, axis=1)) ** 2 / length / rate_hz
-        count = power.shape[1]
-        edges = np.linspace(1, count, min(BANDS, count - 1) + 1).astype(int)  # without the mean
+        edges = np.linspace(1, power.shape[1], min(BANDS, power.shape[1] - 1) + 1).astype(int)  # without the mean
         # Of the typical segments: a jerk of the arm in some shows nothing about the finger.
         bands = trim_mean(np.add.reduceat(power, edges[:-1], axis=1) / np.diff(edges)[:, None], TRIMMED, axis=0)
         return cls(sensor, rate_hz, tuple(channels), np.log(bands + FLOOR), rms, rest_rms, rest_level)

@@ -337,7 +337,10 @@ def collect_surface(
                     keep(explored.exploration_id)
                 return explored.error, explored.message
 
-            end = collection.collect(plan, params, explore, partial(_evaluate_bag, bag, surface), _print_progress)
+            def evaluate() -> collection.PlaceAccuracy:
+                return collection.evaluate_places(_features_of(folder), surface)
+
+            end = collection.collect(plan, params, explore, evaluate, _print_progress)
             if recording.end and end.error is not CollectionError.NOT_RECORDED:  # in the last evaluation, say
                 end = replace(end, error=CollectionError.NOT_RECORDED, message=f'{recording.end}; {end.message}')
     except LaunchFailed:  # the recorder was not discovered
@@ -360,13 +363,6 @@ def _remove(bag: Path) -> None:
 
 def _print_progress(sentence: str, slides: int) -> None:
     print(f'{slides} slide{"s" * (slides != 1)}: {sentence}', flush=True)
-
-
-def _evaluate_bag(bag: Path, surface: str) -> collection.PlaceAccuracy:
-    """Evaluate all bags of the folder of a bag."""
-    from texture_evaluation.collection import evaluate_places
-
-    return evaluate_places(_features_of(bag.parent), surface)
 
 
 def _features_of(folder: Path) -> LabelledFeatures:

@@ -78,10 +78,7 @@ def _surfaces() -> Iterator[Row]:
 LISTS: Mapping[str, tuple[str, Callable[[], Iterable[Row]]]] = {
     'sensors': ('what `sensor:=` of a launch takes', partial(_catalogue, 'texture_drivers.catalogue')),
     'motions': ('what `texture explore` takes, with default and range of each number', _motions),
-    'arms': (
-        'what the parameter `arm` of the explorer takes',
-        partial(_catalogue, 'texture_exploration.arms.catalogue'),
-    ),
+    'arms': ('what `arm` of the explorer takes', partial(_catalogue, 'texture_exploration.arms.catalogue')),
     'recipes': ('what `texture train` takes', _recipes),
     'surfaces': ('what the emulator simulates, by scene', _surfaces),
 }
