@@ -135,7 +135,8 @@ def test_ctrl_c_after_the_motion_was_completed_tells_its_id():
         if taken.is_set():
             raise KeyboardInterrupt
 
-    taken, completed = threading.Event(), msg.ExplorationResult(exploration_id='a', message='completed', lifted=True)
+    taken = threading.Event()
+    completed = msg.ExplorationResult(error_code=0, exploration_id='a', message='completed', lifted=True)
     with (
         silent_explorer(taken, result=completed),
         operators.Operator(domain_id=DOMAIN, guard=press_ctrl_c) as operator,
