@@ -52,7 +52,9 @@ class Launched(ChildLauncher):
 
     def operator(self, namespace: str = '', *, senses: bool = True, listened: tuple[str, ...] = LISTENED) -> Any:
         """Return a client of the nodes of a namespace, once they explore, estimate and, if it senses, measure."""
-        from texture_bringup.operator import Operator  # noqa: PLC0415  # pure tests have no ROS
+        from rclpy.task import Future  # noqa: PLC0415  # pure tests have no ROS
+
+        from texture_bringup.operator import DISCOVERY_S, Operator  # noqa: PLC0415
 
         operator = self.ending.enter_context(Operator(namespace, guard=self.check))
         operator.wait_for_explorer(START_S)
@@ -60,7 +62,7 @@ class Launched(ChildLauncher):
             operator.wait_for_signal(START_S)
         count, missing = operator._node.count_subscribers, f'no node subscribes to one of {", ".join(listened)}'
         operator.wait_until(lambda: all(count(topic) for topic in listened), START_S, missing)
-        operator._settle()  # the others discover them, too
+        operator._complete(Future(), DISCOVERY_S)  # the others discover them, too
         return operator
 
 

@@ -86,6 +86,11 @@ def test_the_slide_before_an_exploration_that_never_slid_is_not_added_in_its_pla
     assert asked(graph, 'add', 'silk') == 2
     assert "'stopped-2' has no usable window: it ended before its slide" in capsys.readouterr().err
     assert asked(graph, 'add', 'silk', 'slide-1') == 0
+    classify_slide(graph, 'stopped-3')
+    publisher.publish(to_msg(ExplorationState(1, 'stopped-3', 'linear_slide', Phase.ABORTED)))
+    assert publisher.wait_for_all_acked()
+    assert asked(graph, 'add', 'silk') == 2
+    assert "exploration 'stopped-3' was aborted" in capsys.readouterr().err
 
 
 def test_parameters_of_a_running_node_are_set_from_the_command_line(graph, classifier, asked, capsys):

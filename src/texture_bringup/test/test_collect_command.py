@@ -13,7 +13,7 @@ import pytest
 
 from texture_bringup.command import main
 from texture_bringup.commands import explore
-from texture_bringup.operator import ExplorationResult
+from texture_bringup.operator import ExplorationResult, Interrupted
 from texture_core.errors import (
     CollectionError,
     ExplorationError,
@@ -23,6 +23,7 @@ from texture_core.errors import (
     TextureError,
 )
 from texture_core.types import RoughnessEstimate, TextureEstimate
+from texture_evaluation import collection
 from texture_evaluation.collection import CollectionEnd, CollectionParams, PlaceAccuracy
 from texture_recordings.bags import BagWriter, read_bag
 
@@ -60,10 +61,10 @@ class Explorer:
 def collected(monkeypatch, tmp_path):
     """Collect with an explorer, by a recorder that makes a bag, and may not start, end or lose samples."""
 
-    def collected(explorer, recorder_ends=False, start=None, losses='', ends_late='', **params):
+    def collected(explorer, *, recorder_ends=False, start=None, losses='', ends_late='', wait_for=None, **params):
         recording = Mock(end=ends_late)
         recording.check.side_effect = InvalidData('the recorder died with exit code 1') if recorder_ends else None
-        recording.wait_for.side_effect = losses if isinstance(losses, list) else lambda _name: losses
+        recording.wait_for.side_effect = wait_for or (losses if isinstance(losses, list) else lambda _name: losses)
 
         @contextmanager
         def recorder(_operator, bag, _namespace):
@@ -106,16 +107,16 @@ def test_a_bag_without_any_slide_is_removed_and_the_sentence_says_so(collected, 
     assert end.message.endswith('; no slide was made, so no bag is kept') != kept
 
 
-def test_touches_begin_when_the_recorder_writes_what_the_nodes_send(two_surfaces: Path, tmp_path: Path) -> None:
+def test_touches_begin_when_the_recorder_writes_what_every_node_sends(two_surfaces: Path, tmp_path: Path) -> None:
     [recorded, _] = sorted((two_surfaces / 'bags').iterdir())
-    streams = {name: value for name, _, value in read_bag(recorded, explore.RECORDED)}
-    bag = tmp_path / 'cork'
-    assert not explore.records(bag, lambda: None)
+    streams = {name: value for name, _, value in read_bag(recorded, ('signal', 'exploration'))}
+    bag, wanted = tmp_path / 'cork', {'finger0/signal', 'signal', 'exploration'}
+    assert not explore.records(bag, 'left', wanted, lambda: None)
     writer = BagWriter(bag)
-    for name, complete in (('signal', False), ('exploration', True)):
-        writer.write(f'/left/{name}', streams[name], 1)
+    for name in ('finger0/signal', 'finger1/signal', 'exploration', 'signal'):
+        writer.write(f'/left/{name}', streams[name.rpartition('/')[2]], 1)
         writer.flush()
-        assert explore.records(bag, lambda: None) == complete
+        assert explore.records(bag, 'left', wanted, lambda: None) == (name == 'signal')
     writer.close()
 
 
@@ -143,6 +144,28 @@ def test_a_bag_in_the_folder_that_cannot_be_used_is_refused_before_the_robot_mov
 DONE = ExplorationError.NONE, 'id'
 
 
+ENDED = 'the exploration has ended: the motion was completed'
+
+
+@pytest.mark.parametrize('ended', [False, True])
+def test_a_slide_that_was_completed_before_ctrl_c_is_kept_once_it_is_on_the_disk(collected, tmp_path, ended):
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # as the command does
+    written = []
+
+    def write(name):
+        if not ended:
+            signal.raise_signal(signal.SIGINT)
+        written.append(name)
+        return ''
+
+    try:
+        end, bag = collected(Explorer(Interrupted(ENDED, 'id') if ended else DONE), wait_for=write)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert (end.error, end.slides, bag, written) == (CollectionError.CANCELLED, 1, tmp_path / 'cork', ['id'])
+    assert end.message == (f'stopped: {ENDED}' if ended else 'stopped')
+
+
 def test_ctrl_c_while_the_recorder_starts_leaves_no_bag(collected, tmp_path):
     end, bag = collected(Explorer(), start=KeyboardInterrupt())
     assert (end.error, bag, tmp_path.exists()) == (CollectionError.CANCELLED, None, False)
@@ -156,7 +179,8 @@ def test_a_recorder_that_is_not_discovered_leaves_no_bag(collected, tmp_path):
 
 
 def test_lost_samples_are_reported_once_and_at_the_end(collected, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(explore, '_evaluate_bag', lambda *_: PlaceAccuracy(2, 0))
+    monkeypatch.setattr(explore, '_features_of', lambda _folder: None)
+    monkeypatch.setattr(collection, 'evaluate_places', lambda *_: PlaceAccuracy(2, 0))
     end, bag = collected(Explorer(DONE, DONE), losses='2970 samples lost', places=2)
     assert (end.error, end.slides, bag) == (CollectionError.NONE, 2, tmp_path / 'cork')
     assert '; 2970 samples lost; windows with a gap are left out of features and training; ' in end.message
@@ -173,7 +197,8 @@ def test_a_slide_that_the_recorder_has_not_written_does_not_count(collected, tmp
 
 
 def test_a_recorder_that_ends_in_the_last_evaluation_is_reported(collected, monkeypatch):
-    monkeypatch.setattr(explore, '_evaluate_bag', lambda *_: PlaceAccuracy(2, 0))
+    monkeypatch.setattr(explore, '_features_of', lambda _folder: None)
+    monkeypatch.setattr(collection, 'evaluate_places', lambda *_: PlaceAccuracy(2, 0))
     end, _ = collected(Explorer(DONE, DONE), ends_late=KILLED, places=2)
     assert (end.error, end.slides) == (CollectionError.NOT_RECORDED, 2)
     assert end.message.startswith(f'{KILLED}; 2 places')

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from texture_bringup.feed import (
     Feed,
     NodeStatuses,
     Ring,
+    number_text,
     spectrum_db,
     texture_text,
 )
@@ -71,10 +73,10 @@ def test_before_an_estimate_the_page_shows_why_there_is_none(reports, expected) 
     for name, level, message in reports:
         feed.node_statuses.update(name, level, message, 0.0)
     feed.on_state(sliding('a'))
-    assert feed.frame(0.5)['texture']['missing'] == ('no estimate yet' if not reports else expected)
-    assert feed.frame(1.0 + SILENT_S)['texture']['missing'] == expected
+    assert feed.frame(0.5)['texture']['note'] == ('no estimate yet' if not reports else expected)
+    assert feed.frame(1.0 + SILENT_S)['texture']['note'] == expected
     feed.on_texture(TextureEstimate(2, 'a', 'felt', Rejection.NONE, 0.9))
-    assert feed.frame(1.0)['texture']['missing'] == ''
+    assert feed.frame(1.0)['texture']['note'] == 'confidence 0.90'
 
 
 @pytest.mark.parametrize(
@@ -88,8 +90,55 @@ def test_before_an_estimate_the_page_shows_why_there_is_none(reports, expected) 
 def test_a_past_exploration_is_listed_with_its_rejection(rejection, listed) -> None:
     feed = Feed()
     feed.on_state(sliding('a'))
+    assert feed.frame(0.0)['past'] == [{'id': 'a', 'text': 'linear_slide · slide · no label · a'}]
     feed.on_texture(TextureEstimate(2, 'a', 'glass', rejection, 0.9))
-    assert feed.frame(0.0)['past'][0]['label'] == listed
+    assert feed.frame(0.0)['past'][0]['text'] == f'linear_slide · slide · {listed} · a'
+    feed.on_state(replace(sliding('a'), phase=Phase.DONE, surface='cork'))
+    feed.on_roughness(RoughnessEstimate(2, 'a', True, 3.25, 0.5))
+    assert feed.frame(0.0)['past'][0]['text'] == f'linear_slide · done · {listed} · (over cork) · roughness 3.2 · a'
+
+
+@pytest.mark.parametrize(
+    ('estimate', 'shown', 'note'),
+    [
+        (
+            TextureEstimate(2, 'a', 'felt', Rejection.NONE, 0.912, windows=9, evidence_s=2.26),
+            'felt',
+            'confidence 0.91 · 9 windows, 2.3 s',
+        ),
+        (
+            TextureEstimate(2, 'a', 'felt', Rejection.NOVEL, 0.6, windows=3, evidence_s=1.0),
+            'felt?',
+            'confidence 0.60 · 3 windows, 1.0 s · rejected: novel',
+        ),
+        (TextureEstimate(2, 'a', windows=2, evidence_s=0.6, message='too short'), '–', '2 windows, 0.6 s · too short'),
+    ],
+)
+def test_an_estimate_is_shown_with_a_question_mark_unless_it_is_accepted_and_with_what_it_rests_on(
+    estimate, shown, note
+) -> None:
+    feed = Feed()
+    feed.on_state(sliding('a'))
+    feed.on_texture(estimate)
+    texture = feed.frame(0.0)['texture']
+    assert (texture['shown'], texture['note']) == (shown, note)
+
+
+def test_numbers_are_shown_with_their_unit_and_unknown_ones_as_a_dash() -> None:
+    feed = Feed()
+    feed.on_state(sliding('a'))
+    feed.on_roughness(RoughnessEstimate(2, 'a', True, 2.0, 0.52))
+    frame = feed.frame(0.0)
+    assert (frame['state']['speed'], frame['state']['force']) == ('0.050 m/s', '1.00 N')
+    roughness = frame['roughness']
+    assert (roughness['shown'], roughness['note']) == ('2.0', '± 0.5')
+    feed.on_roughness(RoughnessEstimate(3, 'a', message='too short'))
+    roughness = feed.frame(0.0)['roughness']
+    assert (roughness['shown'], roughness['note']) == ('–', 'too short')
+    assert Feed().frame(0.0)['state']['force'] == '–'
+    assert number_text('speed_m_s', 'm/s', 0.002, 0.25) == 'speed (m/s), 0.002 to 0.25'
+    assert number_text('distance_m', 'm', 0.01, 1.0) == 'distance (m), 0.01 to 1 within the workspace'
+    assert number_text('turns', 'turns', 1.0, 10.0) == 'turns, 1 to 10'
 
 
 def test_a_finger_that_may_press_after_a_restart_of_the_explorer_is_a_warning_until_it_is_lifted() -> None:
@@ -103,6 +152,13 @@ def test_a_finger_that_may_press_after_a_restart_of_the_explorer_is_a_warning_un
     assert feed.frame(0.0)['warning'] == 'the finger may still press: look at the robot, and call `texture lift`'
     feed.on_state(free)
     assert feed.frame(0.0)['warning'] == ''
+    feed.on_state(sliding('b'))
+    feed.on_state(replace(sliding('b'), phase=Phase.DONE, lifted=True))
+    feed.on_state(unknown)  # taken control of again, after `texture deactivate`
+    assert feed.frame(0.0)['warning'] == ''
+    feed.on_state(replace(sliding('c'), phase=Phase.ABORTED))  # and not lifted
+    feed.on_state(unknown)
+    assert feed.frame(0.0)['warning'] != ''
 
 
 ELSEWHERE = 'trained at one place of each surface: elsewhere it may be rejected'
@@ -148,7 +204,9 @@ def test_a_new_exploration_begins_without_evidence_and_a_late_estimate_enters_on
     feed.on_texture(TextureEstimate(3, 'a', 'cork', Rejection.NONE, 0.9))
     frame = feed.frame(0.0)
     assert frame['texture']['label'] == ''
-    assert [(past['id'], past.get('label')) for past in frame['past']] == [('b', None), ('a', 'cork')]
+    assert [past['text'] for past in frame['past']] == [
+        f'linear_slide · slide · {one}' for one in ('no label · b', 'cork · a')
+    ]
 
 
 def test_a_failing_node_and_a_silent_one_are_red() -> None:

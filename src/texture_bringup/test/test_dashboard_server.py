@@ -75,6 +75,14 @@ def test_the_page_asks_for_what_the_server_offers_and_for_all_of_it() -> None:
     assert set(asked) == set(BUTTONS)
 
 
+def test_the_page_shows_at_once_what_each_button_does() -> None:
+    script = (PAGE / 'dashboard.js').read_text()
+    [table] = re.findall(r'^const DOING = {\n(.*?)^};', script, re.MULTILINE | re.DOTALL)
+    assert set(re.findall(r"^  (\w+): '\w.* …',$", table, re.MULTILINE)) == set(BUTTONS)
+    [asking] = re.findall(r'^async function ask\(.*?^}', script, re.MULTILINE | re.DOTALL)
+    assert asking.index('DOING[name]') < asking.index('await fetch')
+
+
 @pytest.mark.parametrize('path', ['/none', '/../package.xml', '/%2e%2e/package.xml', '/api/explore'])
 def test_an_unknown_path_is_not_found(path) -> None:
     async def story(client, _nodes):

@@ -183,7 +183,7 @@ def test_an_operator_explores_sees_the_estimate_tares_and_stops_the_next_explora
         stopped = pool.submit(page.post, 'explore', LONG)
         page.until(lambda _frame: 'what this page requested is cancelled' in page.post('stop', {}))
         assert re.search('stopped|cancelled', stopped.result(DEADLINE_S))
-    page.until(lambda frame: frame['past'][0]['phase'] == 'aborted')
+    page.until(lambda frame: ' aborted ' in frame['past'][0]['text'])
 
 
 def test_the_sample_can_be_swapped_and_an_unknown_one_gets_the_nearest(operator, models) -> None:

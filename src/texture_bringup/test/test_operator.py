@@ -130,6 +130,23 @@ def test_ctrl_c_says_that_the_robot_must_be_looked_at_when_the_explorer_does_not
             operator.explore(ExplorationRequest('linear_slide'))
 
 
+def test_ctrl_c_after_the_motion_was_completed_tells_its_id():
+    def press_ctrl_c():
+        if taken.is_set():
+            raise KeyboardInterrupt
+
+    taken = threading.Event()
+    completed = msg.ExplorationResult(error_code=0, exploration_id='a', message='completed', lifted=True)
+    with (
+        silent_explorer(taken, result=completed),
+        operators.Operator(domain_id=DOMAIN, guard=press_ctrl_c) as operator,
+    ):
+        operator.wait_for_explorer(30.0)
+        with pytest.raises(operators.Interrupted, match=r'^the exploration has ended: completed$') as interrupted:
+            operator.explore(ExplorationRequest('linear_slide'))
+    assert interrupted.value.completed == 'a'
+
+
 @pytest.mark.parametrize('end', ['no answer', 'Ctrl-C'])
 def test_a_request_that_is_accepted_after_its_client_gave_up_is_cancelled_at_once(monkeypatch, end):
     monkeypatch.setattr(operators, 'ACCEPT_S', 0.5)

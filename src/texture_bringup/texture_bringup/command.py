@@ -95,7 +95,7 @@ def _dispatch(given: Sequence[str]) -> int:
     command = find(installed(), name, 'sub-command of texture')
     show_progress()
     try:
-        with task(f'starting {name}'):
+        with task(f'loading the libraries of {name}'):
             module = cast(Command, command.load())
             parser = Parser(prog=f'texture {name}', description=summary(command))
             module.configure(parser)

@@ -106,9 +106,7 @@ def envelope(samples: NDArray[np.float64], points: int) -> tuple[NDArray[np.floa
     if points == 0:
         return np.zeros(0), np.zeros(0)
     edges = np.linspace(0, len(samples), points, endpoint=False).astype(int)
-    low = np.fmin.reduceat(samples, edges)
-    high = np.fmax.reduceat(samples, edges)
-    return low, high
+    return np.fmin.reduceat(samples, edges), np.fmax.reduceat(samples, edges)
 
 
 def spectrum_db(samples: NDArray[np.float64], bins: int) -> NDArray[np.float64]:
@@ -185,6 +183,7 @@ def places_of(channels: tuple[str, ...]) -> list[tuple[int, int]]:
 # --------------------
 # Estimates as texts for people.
 
+SEPARATOR, UNKNOWN = ' · ', '–'
 REASONS = {Rejection.NOVEL: 'it resembles no trained texture', Rejection.OUTSIDE_TRAINING: 'outside the training'}
 
 
@@ -212,6 +211,26 @@ def texture_text(estimate: TextureEstimate) -> str:
     return f'unknown (nearest: {nearest}): {why}'
 
 
+def evidence_text(estimate: TextureEstimate) -> str:
+    """Return what a label rests on, and why it is rejected; without a label the message."""
+    seen = f'{estimate.windows} windows, {estimate.evidence_s:.1f} s' if estimate.windows else ''
+    if not estimate.label:
+        return SEPARATOR.join(filter(None, (seen, estimate.message)))
+    rejected = '' if estimate.accepted else f'rejected: {in_words(estimate.rejection)}'
+    return SEPARATOR.join(filter(None, (f'confidence {quantity(estimate.confidence, 2)}', seen, rejected)))
+
+
+def quantity(value: float, digits: int, unit: str = '') -> str:
+    """Return a number as text, '–' if it is unknown."""
+    return f'{value:.{digits}f} {unit}'.rstrip() if math.isfinite(value) else UNKNOWN
+
+
+def number_text(name: str, unit: str, low: float, high: float) -> str:
+    """Return a number of a motion with its range: 'speed (m/s), 0.002 to 0.25'."""
+    what = f'{name.partition("_")[0]} ({unit})' if unit not in ('', name) else name
+    return f'{what}, {low:g} to {high:g}{" within the workspace" * (unit == "m")}'
+
+
 def roughness_text(estimate: RoughnessEstimate) -> str:
     """Return a roughness estimate as text."""
     if not estimate.valid:
@@ -228,22 +247,22 @@ SIGNAL_S, SPECTRUM_S, LEVEL_S = 2.0, 0.5, 0.1
 POINTS, BINS = 240, 128
 MAX_LABELS = 200
 DIGITS = 4
-IDLE = ExplorationState(0, '', '', Phase.IDLE)
 
 
 class Feed:
     """Collect the messages of the nodes and return frames. Used from one thread at a time."""
 
     def __init__(self) -> None:
-        self._past: dict[str, dict[str, Any]] = {}  # summaries by exploration, the newest last
+        self._past: dict[str, dict[str, str]] = {}  # summaries by exploration, the newest last
         self.node_statuses = NodeStatuses()
         self._ring = Ring(SIGNAL_S)
         self._taxels = Taxels()
-        self._state = IDLE
+        self._state = ExplorationState(0, '', '', Phase.IDLE)
         self._texture = TextureEstimate(0, '')
         self._model = ModelInfo(0)
         self._roughness = RoughnessEstimate(0, '')
         self._began_s = math.inf  # the first frame
+        self._may_press = False  # since an exploration that was not seen to end with a lifted finger
         self.recorded = False  # the messages come from a bag, in which no node can report
         self.recording = ''  # folder that is being recorded to
         self.working = ''  # last message of a sub-command that the page has started
@@ -270,18 +289,24 @@ class Feed:
 
     def on_state(self, state: ExplorationState) -> None:
         """Take the state of the finger; a new exploration begins without evidence."""
-        if state.exploration_id and state.exploration_id not in self._past:
-            self._texture = TextureEstimate(state.stamp_ns, state.exploration_id)
-            self._roughness = RoughnessEstimate(state.stamp_ns, state.exploration_id)
+        name = state.exploration_id
+        if name and name not in self._past:
+            self._texture, self._roughness = (
+                TextureEstimate(state.stamp_ns, name),
+                RoughnessEstimate(state.stamp_ns, name),
+            )
+            self._past[name] = {'motion': '', 'phase': '', 'label': 'no label', 'surface': '', 'grade': '', 'id': name}
+            if len(self._past) > MAX_EXPLORATIONS:
+                del self._past[next(iter(self._past))]
         self._state = state
-        if state.exploration_id:
-            seen = {'motion': state.motion, 'phase': state.phase.value, 'surface': state.surface}
-            self._note(state.exploration_id, seen)
+        # An explorer that takes control again knows nothing of its finger; the last exploration has told of it.
+        self._may_press = not state.lifted and (bool(name) or self._may_press)
+        over = f'(over {state.surface})' if state.surface else ''
+        self._note(name, {'motion': state.motion, 'phase': state.phase.value, 'surface': over})
 
     def on_texture(self, estimate: TextureEstimate) -> None:
         """Take an estimate; one of an exploration before the present one only enters its summary."""
-        if estimate.exploration_id in self._past:
-            self._note(estimate.exploration_id, {'label': label_text(estimate)})
+        self._note(estimate.exploration_id, {'label': label_text(estimate) or 'no label'})
         if estimate.exploration_id == self._texture.exploration_id or not self._texture.exploration_id:
             self._texture = estimate
 
@@ -291,16 +316,15 @@ class Feed:
 
     def on_roughness(self, estimate: RoughnessEstimate) -> None:
         """Take an estimate; one of an exploration before the present one only enters its summary."""
-        if estimate.exploration_id in self._past:
-            self._note(estimate.exploration_id, {'grade': _number(estimate.grade)})
+        grade = f'roughness {estimate.grade:.1f}' if math.isfinite(estimate.grade) else ''
+        self._note(estimate.exploration_id, {'grade': grade})
         if estimate.exploration_id == self._roughness.exploration_id or not self._roughness.exploration_id:
             self._roughness = estimate
 
-    def _note(self, exploration_id: str, seen: Mapping[str, Any]) -> None:
-        """Add to the summary of an exploration; the oldest is forgotten."""
-        self._past[exploration_id] = {**self._past.get(exploration_id, {}), **seen, 'id': exploration_id}
-        if len(self._past) > MAX_EXPLORATIONS:
-            del self._past[next(iter(self._past))]
+    def _note(self, exploration_id: str, seen: Mapping[str, str]) -> None:
+        """Add to the summary of an exploration that is listed."""
+        if exploration_id in self._past:
+            self._past[exploration_id].update(seen)
 
     def newest(self) -> tuple[ExplorationState, TextureEstimate, RoughnessEstimate]:
         """Return the newest state and estimates of the present exploration."""
@@ -309,18 +333,29 @@ class Feed:
     def frame(self, time_s: float) -> dict[str, Any]:
         """Return everything that is shown at a time of the monotonic clock, s, as JSON can carry it."""
         self._began_s = min(self._began_s, time_s)
-        # As after the restart of an explorer that was killed; one that has not explored yet touches nothing.
-        unknown = self._state.phase is Phase.IDLE and not self._state.lifted and bool(self._past)
+        state, grade = self._state, self._roughness
         return {
-            'warning': MAY_PRESS if unknown else '',
+            'warning': MAY_PRESS * (self._may_press and state.phase is Phase.IDLE),  # an explorer that was killed
             'signal': self._signal(),
             'spectrum': self._spectrum(),
             'taxels': self._image(),
-            'state': _shown(self._state),
+            'state': {
+                **_shown(state),
+                'speed': quantity(state.speed_m_s, 3, 'm/s'),
+                'force': quantity(state.force_n, 2, 'N'),
+            },
             'texture': self._evidence(time_s),
-            'roughness': {**_shown(self._roughness), 'text': roughness_text(self._roughness)},
+            'roughness': {
+                **_shown(grade),
+                'shown': quantity(grade.grade, 1) if grade.valid else UNKNOWN,
+                'note': f'± {quantity(grade.grade_std, 1)}' if grade.valid else grade.message,
+                'text': roughness_text(grade),
+            },
             'lights': self.node_statuses.shown(time_s),
-            'past': list(reversed(self._past.values())),
+            'past': [
+                {'id': name, 'text': SEPARATOR.join(filter(None, seen.values()))}
+                for name, seen in reversed(self._past.items())
+            ],
             'recording': self.recording,
             'working': self.working,
         }
@@ -368,7 +403,8 @@ class Feed:
         return {
             **_shown(estimate),
             'accepted': estimate.accepted,
-            'missing': missing,
+            'shown': f'{estimate.label}{"?" * (not estimate.accepted)}' if estimate.label else UNKNOWN,
+            'note': missing or evidence_text(estimate),
             'text': missing or texture_text(estimate),
             'labels': [label for _, label in pairs],
             'probabilities': _numbers(probability for probability, _ in pairs),

@@ -166,7 +166,6 @@ STEPS: Mapping[bool, Mapping[str, int]] = {
     True: {'unconfigured': Transition.TRANSITION_CONFIGURE, 'inactive': Transition.TRANSITION_ACTIVATE},
     False: {'active': Transition.TRANSITION_DEACTIVATE},
 }
-RESTARTED = f'the explorer was restarted and does not know this exploration, which was aborted; {MAY_PRESS}'
 VANISHED = (
     'the explorer has vanished; if it was exploring, the finger may still touch the surface: look at the robot, and at '
     'the output of the explorer'
@@ -191,6 +190,22 @@ class ExplorationResult:
         return self.error is ExplorationError.NONE
 
 
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C in an exploration: how that ended, and its id if it was completed all the same."""
+
+    def __init__(self, sentence: str, completed: str = '') -> None:
+        super().__init__(sentence)
+        self.completed = completed
+
+
+def _unconfirmed() -> Interrupted:
+    """Return what an operator must know whose stop was not answered."""
+    return Interrupted(
+        f'the explorer has not confirmed within {CANCEL_DEADLINE_S:g} s that the finger was lifted; look at the robot, '
+        'and use its emergency stop if it moves'
+    )
+
+
 def _given_up(goal: Any, why: str) -> MotionAborted:
     """Cancel a request that is given up, as an explorer that only hung must not begin it later; return the error."""
     goal.cancel_goal_async()
@@ -200,14 +215,6 @@ def _given_up(goal: Any, why: str) -> MotionAborted:
 def _message(result: Any) -> str:
     """Return how an exploration ended, and of an aborted one that the finger was lifted, if that is known."""
     return f'{result.message}{"; the finger was lifted" * bool(result.error_code and result.lifted)}'
-
-
-def _unconfirmed() -> str:
-    """Return what an operator must know whose stop was not answered."""
-    return (
-        f'the explorer has not confirmed within {CANCEL_DEADLINE_S:g} s that the finger was lifted; look at the robot, '
-        'and use its emergency stop if it moves'
-    )
 
 
 class Operator:
@@ -267,25 +274,17 @@ class Operator:
         """Wait until the sensor delivers samples."""
         batches: list[msg.TactileSignal] = []
         subscription = self._node.create_subscription(msg.TactileSignal, 'signal', batches.append, SENSOR_QOS)
+        missing = "no samples arrive on 'signal'; is the sensor connected?"
         try:
-            self.wait_until(
-                lambda: bool(batches), deadline_s, "no samples arrive on 'signal'; is the sensor connected?"
-            )
+            self.wait_until(lambda: bool(batches), deadline_s, missing)
         finally:
             self._node.destroy_subscription(subscription)
 
     def watch_stops(self) -> Callable[[], bool]:
-        """Return what says whether the explorer is told to stop from now on, between explorations, too."""
+        """Return what says whether the explorer was told to stop since, between explorations, too; see `explore`."""
         ends: list[int] = []
         self._on_info(lambda info: ends.append(info.last_error_code))
-
-        def stopped() -> bool:
-            end_s = time.monotonic() + STEP_S
-            while time.monotonic() < end_s:  # a caller who waited for something else has not heard it yet
-                self._step()
-            return any(end == ExplorationError.STOPPED != before for before, end in pairwise(ends))
-
-        return stopped
+        return lambda: any(end == ExplorationError.STOPPED != before for before, end in pairwise(ends))
 
     def explore(
         self,
@@ -293,7 +292,7 @@ class Operator:
         on_progress: Progress = lambda _state, _texture: None,
         stopped: Callable[[], bool] = lambda: False,
     ) -> ExplorationResult:
-        """Explore, and return what was measured; Ctrl-C stops the exploration before it goes on.
+        """Explore, and return what was measured; Ctrl-C stops the exploration, and is raised as `Interrupted` then.
 
         `stopped` says whether the explorer was told to stop, which may be before it has the request.
         """
@@ -306,6 +305,7 @@ class Operator:
         self._states = self._states or self._node.create_subscription(*hear, raw=True)
         goal_id = GoalInfo().goal_id
         goal_id.uuid = list(uuid4().bytes)
+        self._complete(Future(), STEP_S)  # a caller who waited for something else has not heard of a stop yet
         if stopped():
             raise MotionRefused('the request was stopped before it was sent', ExplorationError.STOPPED)
         accepted = self._explore.send_goal_async(action.Explore.Goal(request=to_msg(request)), on_feedback, goal_id)
@@ -321,7 +321,7 @@ class Operator:
             self._withdraw(goal_id)
             self._complete(accepted, CANCEL_DEADLINE_S)
             goal = accepted.result()
-            raise KeyboardInterrupt(self._cancel(goal, goal.get_result_async()) if goal else _unconfirmed()) from None
+            raise (self._cancel(goal, goal.get_result_async()) if goal else _unconfirmed()) from None
         goal, cancelled = accepted.result(), False
         endings = [goal.get_result_async()]
         deadline_s = time.monotonic() + (request.timeout_s + CANCEL_DEADLINE_S if request.timeout_s else math.inf)
@@ -338,13 +338,15 @@ class Operator:
                     endings.append(goal.get_result_async())
                     asked_s = now_s
         except KeyboardInterrupt:
-            raise KeyboardInterrupt(self._cancel(goal, endings[0])) from None
+            raise self._cancel(goal, endings[0]) from None
         answer = next((ending.result() for ending in endings if ending.done()), None)
         if answer is None:
             late = f'no result within the timeout of {request.timeout_s:g} s; the exploration was cancelled'
             raise _given_up(goal, late)
         if answer.status == GoalStatus.STATUS_UNKNOWN:
-            raise MotionAborted(RESTARTED)
+            raise MotionAborted(
+                f'the explorer was restarted and does not know this exploration, which was aborted; {MAY_PRESS}'
+            )
         result = answer.result.result
         return ExplorationResult(
             ExplorationError(result.error_code),
@@ -437,13 +439,8 @@ class Operator:
         )
         missing = "no node publishes on 'features'; is the feature_extractor running?"
         self.wait_until(lambda: self._node.count_publishers('features') > 0, FEATURES_DEADLINE_S, missing)
-        self._settle()
+        self._complete(Future(), DISCOVERY_S)
         return vectors
-
-    def _settle(self) -> None:
-        """Wait until other processes have discovered what this process has."""
-        settled_s = time.monotonic() + DISCOVERY_S
-        self.wait_until(lambda: time.monotonic() > settled_s, 2 * DISCOVERY_S, '')
 
     def _ask_classifier(self, kind: Any, name: str, request: Any) -> Any:
         """Return the answer of a service of the classifier that succeeded."""
@@ -556,11 +553,13 @@ class Operator:
         handle = ClientGoalHandle(self._explore, goal_id, action.Explore.Impl.SendGoalService.Response())
         return handle.cancel_goal_async()
 
-    def _cancel(self, goal: Any, ending: Future) -> str:
-        """Cancel, wait until the finger is lifted, and return in a sentence how it ended."""
+    def _cancel(self, goal: Any, ending: Future) -> Interrupted:
+        """Cancel, wait until the finger is lifted, and return how it ended."""
         goal.cancel_goal_async()
         with task(f'waiting for the end of the exploration; {EMERGENCY}'):
             self._complete(ending, CANCEL_DEADLINE_S)
         if not ending.done():
             return _unconfirmed()
-        return f'the exploration has ended: {_message(ending.result().result.result)}'
+        result = ending.result().result.result
+        completed = '' if result.error_code else result.exploration_id
+        return Interrupted(f'the exploration has ended: {_message(result)}', completed)

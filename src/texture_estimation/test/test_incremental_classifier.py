@@ -154,6 +154,20 @@ def test_what_cannot_be_trained_is_refused_with_a_sentence(model, silk, measured
         classifier.add('silk')
 
 
+def test_an_aborted_slide_is_refused_by_name_and_others_can_be_added(model, silk, measured):
+    classifier = IncrementalClassifier(model)
+    measured(classifier, silk)
+    classifier.begin('stopped')
+    measured(classifier, silk[:1], 'stopped')
+    classifier.abort('stopped')
+    for name in ('', 'stopped'):
+        with pytest.raises(ChangeRefused, match=r"'stopped' was aborted, .*; explore again\. Can be added: e1$"):
+            classifier.add('silk', name)
+    with pytest.raises(ChangeRefused, match=r'Can be added: e1$'):
+        classifier.add('silk', 'e9')
+    assert classifier.add('silk', 'e1') == len(silk)
+
+
 def test_a_example_that_cannot_be_kept_is_not_learnt(model, silk, tmp_path, measured):
     (tmp_path / 'm.added').write_text('in the way')
     classifier = IncrementalClassifier(model, tmp_path / 'm')

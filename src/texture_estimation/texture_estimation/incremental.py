@@ -57,12 +57,17 @@ class IncrementalClassifier:
         self._numbers = stored_numbers(path) if path is not None else []  # of the files, one for each added slide
         self._recent_windows: OrderedDict[str, list[Array]] = OrderedDict()
         self._conditions: dict[str, RunningConditions] = {}  # of the same explorations
+        self._aborted: set[str] = set()  # of them
         self._sliding: str | None = None  # the exploration whose end has not come
 
     def begin(self, exploration_id: str) -> None:
         """Note an exploration as the newest one: if it ends before it slides, no earlier one takes its place."""
         self._sliding = None
         self._recent_windows_of(exploration_id)
+
+    def abort(self, exploration_id: str) -> None:
+        """Note an exploration as aborted, so that it is not added."""
+        self._aborted.add(exploration_id)
 
     def observe(self, vector: FeatureVector) -> None:
         """Keep a window, so that its exploration can be added."""
@@ -105,21 +110,24 @@ class IncrementalClassifier:
         while len(self._recent_windows) > EXPLORATIONS:
             oldest, _ = self._recent_windows.popitem(last=False)
             del self._conditions[oldest]
+            self._aborted.discard(oldest)
         return windows
 
     def _refuse_without_window(self, exploration_id: str) -> None:
-        if self._recent_windows.get(exploration_id):
+        if self._recent_windows.get(exploration_id) and exploration_id not in self._aborted:
             return
         if not self._recent_windows:
             raise ChangeRefused('no exploration was classified with this model; explore first', ChangeError.NO_SLIDE)
         reason = (
-            f"exploration '{exploration_id}' has no usable window: it ended before its slide or a window of it, its "
-            'samples were lost, or its features do not fit the model'
+            f"exploration '{exploration_id}' was aborted, so its slide is not whole; explore again"
+            if exploration_id in self._aborted
+            else f"exploration '{exploration_id}' has no usable window: it ended before its slide or a window of it, "
+            'its samples were lost, or its features do not fit the model'
             if exploration_id in self._recent_windows
             else f"no exploration '{exploration_id}' is among the last {EXPLORATIONS}"
         )
-        usable = ', '.join(name for name, windows in self._recent_windows.items() if windows) or 'none'
-        raise ChangeRefused(f'{reason}. Can be added: {usable}', ChangeError.NO_SLIDE)
+        usable = (name for name, windows in self._recent_windows.items() if windows and name not in self._aborted)
+        raise ChangeRefused(f'{reason}. Can be added: {", ".join(usable) or "none"}', ChangeError.NO_SLIDE)
 
     def _refuse_second_time(self, exploration_id: str, label: str) -> None:
         """Refuse an exploration that was added before: counted twice, one slide would raise the confidence."""

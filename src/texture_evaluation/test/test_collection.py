@@ -191,7 +191,7 @@ def run(evaluations, touches=(), params=PARAMS):
         PlacePlan('oak', params, PATCH),
         params,
         explore,
-        lambda _slides: next(given),
+        lambda: next(given),
         lambda sentence, slides: reports.append((slides, sentence)),
     )
     return end, reports
@@ -249,5 +249,8 @@ def test_who_stops_it_ends_it_at_once_and_the_slides_so_far_count(how, error, me
     assert (end.error, end.message, end.slides, end.accuracy.correct) == (error, message, 3, 3)
 
 
-def test_bags_of_a_surface_are_counted():
-    assert next_bag(['oak', 'oak-2', 'felt'], 'oak') == 'oak-3'
+def test_bags_of_a_surface_are_counted(tmp_path):
+    for name in ('oak', 'oak-2', 'felt'):
+        (tmp_path / name).mkdir()
+    assert next_bag(tmp_path, 'oak') == tmp_path / 'oak-3'
+    assert next_bag(tmp_path / 'new', 'oak') == tmp_path / 'new' / 'oak'

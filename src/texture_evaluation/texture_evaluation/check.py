@@ -18,6 +18,7 @@ from texture_estimation.training import DAY_SUFFIX, adapted
 from texture_evaluation.train import training_examples
 from texture_features.correction import (
     CORRECTION,
+    GAIN_DB,
     RESPONSE_DB,
     SLIDE_NUMBERS,
     Correction,
@@ -78,7 +79,7 @@ def store_reference(
     model: str | Path,
     topics: Iterable[str],
     slides: Sequence[LabelledSlide],
-    request: ExplorationRequest | None = None,
+    request: ExplorationRequest,
 ) -> str:
     """Store the last slide over the plate as that of the finger of the training, once the one before shows the same."""
     if len(slides) < 2:
@@ -89,7 +90,7 @@ def store_reference(
             f'nothing is stored, for two slides over the plate differ: {"; ".join(faults)}. Clean and fasten the '
             'finger, stop other programs on the computer, and store again'
         )
-    made = {name: getattr(request, name) for name in SLIDE_NUMBERS} if request else _numbers_shown(slides[-1])
+    made = {name: getattr(request, name) for name in SLIDE_NUMBERS}
     path = write_reference(model, last, made)
     unknown = '' if all(np.isfinite(one.rest_rms).all() for one in last.values()) else f'; {UNMEASURED}'
     return f"the slide is stored as the reference of the finger, '{path}'{unknown}"
@@ -154,24 +155,13 @@ def _faults(found: Mapping[str, InputComparison]) -> list[str]:
     return [f'{topic}: {fault}' for topic, one in found.items() for fault in one.faults]
 
 
-def _numbers_shown(slide: LabelledSlide) -> dict[str, float]:
-    """Return the numbers of the request that would make a slide again, none if it was not straight."""
-    made = slide.motion
-    if made is None:
-        return {}
-    numbers = (made.speed_m_s, made.force_n, made.speed_m_s * made.duration_s)
-    # To two digits: what was measured at a limit of the explorer may lie a little beyond it.
-    speed_m_s, force_n, distance_m = (float(f'{number:.2g}') for number in numbers)
-    return {'speed_m_s': speed_m_s, 'force_n': force_n, 'distance_m': distance_m, 'direction_rad': made.direction_rad}
-
-
 def _claim(found: Mapping[str, InputComparison]) -> str:
     """Return that a finger is as trained, as far as it was measured, with the numbers."""
     known = all(one.rest_is_known for one in found.values())
     claim = 'the finger is as trained' if known else f'gain and response are as trained, {UNMEASURED}'
     numbers = ', '.join(
-        f'{topic} gain {np.median(one.gain_db):+.1f} dB, response within {np.abs(one.response_db).max():.1f} dB and '
-        f'{one.uneven_db:.1f} dB rms ({RESPONSE_DB:g} dB rms is allowed)'
+        f'{topic} gain {np.median(one.gain_db):+.1f} dB (±{GAIN_DB:g} dB is allowed), response within '
+        f'{np.abs(one.response_db).max():.1f} dB and {one.uneven_db:.1f} dB rms ({RESPONSE_DB:g} dB rms is allowed)'
         + (f', noise × {one.noise_ratio:.1f}, drift {one.drift:.1f} rms' if one.rest_is_known else '')
         for topic, one in found.items()
     )

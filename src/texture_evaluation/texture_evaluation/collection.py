@@ -7,9 +7,10 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import takewhile
+from itertools import count, takewhile
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -63,11 +64,7 @@ class CollectionParams:
     seed: int = param(0, 'Seed of places and directions.', low=0)
 
     def __post_init__(self) -> None:
-        for low, high in (
-            ('places', 'most_places'),
-            ('speed_low_m_s', 'speed_high_m_s'),
-            ('force_low_n', 'force_high_n'),
-        ):
+        for low, high in (('places', 'most_places'), *USUAL):
             if getattr(self, low) > getattr(self, high) > 0:  # 0 is chosen later
                 raise InvalidParameter(
                     f"'{low}' is {getattr(self, low):g}; it must not be above '{high}', {getattr(self, high):g}"
@@ -134,7 +131,7 @@ class PlacePlan:
             )
         self._rng = np.random.default_rng(params.seed)
         self._middles: list[Array] = []
-        if not self._candidates(CANDIDATES):
+        if not self._candidates():
             raise InvalidData(
                 f'no slide of {params.distance_m:g} m with its ramps lies on the patch, which is '
                 f'{patch.x_high_m - patch.x_low_m:g} m by {patch.y_high_m - patch.y_low_m:g} m; ask for shorter '
@@ -144,10 +141,9 @@ class PlacePlan:
     def next(self) -> ExplorationRequest:
         """Return the next touch."""
         number, params = len(self._middles), self._params
-        found = self._candidates(CANDIDATES)
         # The constructor has seen that some fit; on a narrow patch few of a draw do.
-        while not found:
-            found = self._candidates(CANDIDATES)
+        while not (found := self._candidates()):
+            pass
         best = max(found, key=lambda one: min((math.dist(one[3], other) for other in self._middles), default=0.0))
         x_m, y_m, direction_rad, middle = best
         self._middles.append(middle)
@@ -163,12 +159,12 @@ class PlacePlan:
             start_y_m=y_m,
         )
 
-    def _candidates(self, count: int) -> list[tuple[float, float, float, Array]]:
+    def _candidates(self) -> list[tuple[float, float, float, Array]]:
         """Return places, directions and middles of slides that lie on the patch with their ramps."""
         patch, reach_m = self._patch, (1.0 + EDGE) * self._params.distance_m
         low, high = np.array([patch.x_low_m, patch.y_low_m]), np.array([patch.x_high_m, patch.y_high_m])
-        starts = self._rng.uniform(low, high, (count, 2))
-        angles = self._rng.uniform(-math.pi, math.pi, count)
+        starts = self._rng.uniform(low, high, (CANDIDATES, 2))
+        angles = self._rng.uniform(-math.pi, math.pi, CANDIDATES)
         ways = reach_m * np.stack([np.cos(angles), np.sin(angles)], axis=1)
         fits = np.all((starts + ways >= low) & (starts + ways <= high), axis=1)
         return [
@@ -324,7 +320,7 @@ def collect(
     plan: PlacePlan,
     params: CollectionParams,
     explore: Callable[[ExplorationRequest], tuple[ExplorationError, str]],
-    evaluate_all: Callable[[int], PlaceAccuracy],
+    evaluate_all: Callable[[], PlaceAccuracy],
     tell: Callable[[str, int], None],
 ) -> CollectionEnd:
     """Touch place after place until the bound is met, the places are used up, or it cannot or must not continue.
@@ -352,7 +348,7 @@ def collect(
             # Each evaluation trains once for each place; the first and the last possible end are always evaluated.
             if slides % EVERY and slides not in (params.places, params.most_places):
                 continue
-            accuracy = evaluate_all(slides)
+            accuracy = evaluate_all()
             fewer = max(0, slides - accuracy.places)
             tell(f'{accuracy.sentence}{f"; {fewer} {UNCOUNTED}" * bool(fewer)}', slides)
             # The first surface of a folder has nothing to be distinguished from.
@@ -372,9 +368,7 @@ def collect(
     return ended(CollectionError.BOUND_MISSED, accuracy.sentence + missing)
 
 
-def next_bag(existing: Sequence[str], surface: str) -> str:
-    """Return the name of the next bag of a surface: 'oak', 'oak-2', 'oak-3' and so on."""
-    number = 1
-    while (name := surface if number == 1 else f'{surface}-{number}') in existing:
-        number += 1
-    return name
+def next_bag(folder: Path, surface: str) -> Path:
+    """Return the next bag of a surface in a folder: 'oak', 'oak-2', 'oak-3' and so on."""
+    names = (surface if number == 1 else f'{surface}-{number}' for number in count(1))
+    return next(bag for name in names if not (bag := folder / name).exists())

@@ -141,6 +141,7 @@ def test_losses_and_restarts_of_each_stream_are_counted() -> None:
         continuity.update(stream, TactileSignal(0, 's', ('c',), (), 1.0, first, np.zeros((4, 1), dtype=np.float32)))
     assert (continuity.lost['a'], continuity.restarts['a'], continuity.samples['a']) == (2, 1, 16)
     assert (continuity.lost['b'], continuity.restarts['b'], continuity.samples['b']) == (0, 0, 8)
+    assert continuity.losses.startswith('2 samples lost (or slides that a replay left out), and unknown losses in 1 ')
 
 
 def test_slides_that_touched_at_several_places_of_a_surface_know_theirs():

@@ -620,7 +620,8 @@ class Continuity:
         """What was lost, in words, '' if nothing; losses in a restart, which numbers from 0, are unknown."""
         lost, restarts = self.lost.total(), self.restarts.total()
         unknown = f'unknown losses in {restarts} restart{"s" if restarts > 1 else ""} of {RESTARTED}'
-        return ', and '.join(filter(None, (f'{lost} samples lost' if lost else '', unknown if restarts else '')))
+        known = f'{lost} samples lost (or slides that a replay left out)'  # which number their samples likewise
+        return ', and '.join(filter(None, (known * bool(lost), unknown * bool(restarts))))
 
     def update(self, stream: str, signal: TactileSignal) -> None:
         """Take the next batch of a stream; an index that goes back is a restart of its driver, not a loss."""

@@ -13,19 +13,32 @@ const MAX_FRAMES = 300; // of one exploration; a longer one is thinned to every 
 const ENDED = ['idle', 'done', 'aborted'];
 // An explorer that was killed does not lift.
 const LOST = 'no data from the dashboard: the nodes may have ended, and the arm may continue to press: look at the robot';
+// What is shown from a click until its answer.
+const DOING = {
+  explore: 'exploring …',
+  stop: 'stopping …',
+  add: 'adding …',
+  record: 'starting or ending the recording …',
+  tare: 'taring …',
+  recover: 'freeing the arm …',
+  check: 'checking the finger …',
+  collect: 'collecting …',
+};
 const at = (id) => document.getElementById(id);
 let replaying = null;
 const kept = new Map(); // what was shown of each exploration that is listed: texts, every how many, how many came
 let last = 0;
 let live = false;
 let answer = ['', false]; // to the last button, and whether it is bad
+let unanswered = false; // that none came is what is shown
+let asked = 0; // number of the last request
+let answered = 0; // number of the last one that was answered
 let warning = ''; // of the nodes
 let phase = '';
 let stopping = false; // until the idle state says whether the finger was lifted
 let newest = ''; // id of the last exploration
 let curve = { id: '', points: [] };
 
-const shown = (value, digits, unit) => (value === null || value === undefined ? '–' : `${value.toFixed(digits)} ${unit}`);
 const showBanner = () => {
   const text = (live ? [answer[0], answer[0].includes(warning) ? '' : warning] : [LOST, answer[1] && answer[0]]).filter(Boolean).join(' · ');
   at('banner').textContent = text;
@@ -34,6 +47,7 @@ const showBanner = () => {
 };
 const say = (text, bad = false) => {
   answer = [text ?? '', bad];
+  unanswered = false;
   showBanner();
 };
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name);
@@ -180,8 +194,8 @@ function showState(state) {
   at('phase').textContent = state.phase;
   at('phase').className = `phase ${ENDED.includes(state.phase) ? state.phase : 'moving'}`;
   at('progress').value = state.progress ?? 0;
-  at('speed').textContent = shown(state.speed_m_s, 3, 'm/s');
-  at('force').textContent = shown(state.force_n, 2, 'N');
+  at('speed').textContent = state.speed ?? '–';
+  at('force').textContent = state.force ?? '–';
   at('motion-now').textContent = state.motion || '–';
 }
 
@@ -229,13 +243,9 @@ function drawCurve() {
 function showTexture(texture) {
   noteCurve(texture);
   drawCurve();
-  at('label').textContent = texture.label ? (texture.accepted ? texture.label : `${texture.label}?`) : '–';
+  at('label').textContent = texture.shown;
   at('label').dataset.final = texture.final;
-  const seen = texture.windows ? `${texture.windows} windows, ${texture.evidence_s.toFixed(1)} s` : '';
-  const confidence = texture.label && texture.confidence !== null ? `confidence ${texture.confidence.toFixed(2)}` : '';
-  const rejected = texture.label && !texture.accepted ? `rejected: ${texture.rejection}` : '';
-  const missing = texture.label ? '' : texture.missing || texture.message;
-  at('estimate-note').textContent = [confidence, seen, rejected, missing].filter(Boolean).join(' · ');
+  at('estimate-note').textContent = texture.note;
   const advice = texture.label ? texture.message : '';
   at('advice').hidden = !advice;
   at('advice').querySelector('summary').textContent = texture.accepted ? 'Advice' : 'Why';
@@ -254,8 +264,8 @@ function showRoughness(roughness) {
   if (roughness.model) at('roughness').hidden = false;
   const fraction = roughness.valid ? Math.min(1, Math.max(0, (roughness.grade - 1) / 4)) : 0;
   at('gauge-arc').style.strokeDasharray = `${100 * fraction} 100`;
-  at('grade').textContent = roughness.valid ? roughness.grade.toFixed(1) : '–';
-  at('roughness-note').textContent = roughness.valid ? `± ${roughness.grade_std === null ? '?' : roughness.grade_std.toFixed(1)}` : roughness.message;
+  at('grade').textContent = roughness.shown;
+  at('roughness-note').textContent = roughness.note;
 }
 
 function showFrame(frame) {
@@ -285,12 +295,10 @@ function showRest(frame) {
   const past = frame.past.map((item) => ({ ...item, kept: kept.has(item.id) }));
   fill(at('past'), past, (item) => {
     const row = element('li', '');
-    const grade = item.grade === null || item.grade === undefined ? '' : `roughness ${item.grade.toFixed(1)}`;
-    const truth = item.surface ? `(over ${item.surface})` : '';
     const button = element('button', 'Replay');
     button.hidden = !item.kept;
     button.addEventListener('click', () => replay(item.id));
-    row.append(element('span', [item.motion, item.phase, item.label || 'no label', truth, grade, item.id].filter(Boolean).join(' · ')), button);
+    row.append(element('span', item.text), button);
     return row;
   });
 }
@@ -328,16 +336,21 @@ function replay(id) {
 
 async function ask(name, body) {
   const moving = phase && !ENDED.includes(phase);
+  const number = ++asked;
   if (name !== 'stop') stopping = false;
+  say(body.undo ? 'removing the slide that was added last …' : DOING[name]);
   try {
     const answer = await fetch(`api/${name}`, {
       method: 'POST', headers: { 'Content-Type': 'application/json' }, body: JSON.stringify(body),
     });
     const reply = await answer.json();
+    answered = Math.max(answered, number);
     if (name === 'stop') stopping = moving && reply.success;
     say(reply.message, !reply.success);
   } catch (error) {
+    if (number < answered) return; // a later request was answered since
     say(`'${name}' got no answer: ${error.message}`, true);
+    unanswered = true;
   }
 }
 
@@ -353,7 +366,7 @@ async function loadMotions() {
 }
 
 function numberField(number) {
-  const label = element('label', `${number.name.split('_')[0]}${number.unit && number.unit !== number.name ? ` (${number.unit})` : ''}, ${number.low} to ${number.high}${number.unit === 'm' ? ' within the workspace' : ''}`);
+  const label = element('label', number.text);
   const input = document.createElement('input');
   Object.assign(input, { type: 'number', step: 'any', min: number.low, max: number.high, value: number.default, required: true, name: number.name });
   label.append(input);
@@ -363,6 +376,7 @@ function numberField(number) {
 function connect() {
   const socket = new WebSocket(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws`);
   socket.onopen = () => {
+    if (unanswered) say(''); // from now on the state is known
     loadMotions().catch(() => say('the list of motions did not arrive; reload the page', true));
   };
   socket.onmessage = (message) => {
@@ -397,7 +411,6 @@ at('explore').addEventListener('submit', (event) => {
   const numbers = [...at('numbers').querySelectorAll('input')].map((input) => [input.name, Number(input.value)]);
   window.clearInterval(replaying);
   replaying = null;
-  say('exploring');
   ask('explore', {
     motion: at('motion').value, ...Object.fromEntries(numbers), direction_rad: Number(at('direction').value) * Math.PI / 180,
     surface: at('surface').value.trim(), early_stopping: at('early').checked,

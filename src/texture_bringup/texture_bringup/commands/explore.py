@@ -25,7 +25,7 @@ import numpy as np
 
 from texture_bringup.feed import roughness_text, texture_text
 from texture_bringup.launcher import Child
-from texture_bringup.operator import ExplorationResult, Operator, Progress
+from texture_bringup.operator import ExplorationResult, Interrupted, Operator, Progress, uninterrupted
 from texture_core.cli import USER_ERROR, Command, add_namespace, add_parameters, parameters_from, task
 from texture_core.config import find
 from texture_core.errors import (
@@ -145,18 +145,8 @@ OUTCOMES = {ACCEPTED: 'accepted', REJECTED: 'rejected', ABORTED: 'aborted', USER
 
 def as_json(result: ExplorationResult) -> dict[str, Any]:
     """Return a result for JSON: unknown numbers are null."""
-    values = {
-        'outcome': OUTCOMES[exit_code(result)],
-        'error': result.error.name.lower(),
-        'message': result.message,
-        'exploration_id': result.exploration_id,
-        'texture': {
-            **asdict(result.texture),
-            'rejection': result.texture.rejection.name.lower(),
-            'labels': result.labels,
-        },
-        'roughness': asdict(result.roughness),
-    }
+    values = {'outcome': OUTCOMES[exit_code(result)], **asdict(result), 'error': result.error.name.lower()}
+    values['texture'] |= {'rejection': result.texture.rejection.name.lower(), 'labels': values.pop('labels')}
     known: dict[str, Any] = json.loads(json.dumps(values), parse_constant=lambda _: None)
     return known
 
@@ -286,7 +276,6 @@ def _identify(options: argparse.Namespace) -> int:
 RECIPE = 'default'  # whose features distinguish the places
 GAPS = 'windows with a gap are left out of features and training; if many are, reduce the load of the computer'
 WRITTEN_S = 60.0  # within which a slide is on the disk: the recorder may be behind
-RECORDED = ('signal', 'exploration')
 RECORDER_S = 60.0  # to start, on a busy machine
 PATCH = ('patch_x_low_m', 'patch_x_high_m', 'patch_y_low_m', 'patch_y_high_m')
 LEAST_SPEED_M_S = 0.002  # of every explorer
@@ -313,35 +302,45 @@ def collect_surface(
         )
     patch = collection.Patch(low_x, high_x, low_y, high_y)
     plan = collection.PlacePlan(surface, params, patch, (low_n, high_n), (LEAST_SPEED_M_S, high_m_s))
-    folder.mkdir(parents=True, exist_ok=True)
     if any(map(is_bag, folder.iterdir())):
         try:
             _features_of(folder)  # what cannot be used is refused before the robot moves
         except TextureError as error:
             raise InvalidData(f"{error}; or move that bag out of '{folder}'") from error
-    bag = folder / collection.next_bag([one.name for one in folder.iterdir()], surface)
+    bag = collection.next_bag(folder, surface)
     made, losses = 0, ''
     end = collection.CollectionEnd(CollectionError.CANCELLED, 'stopped', 0)  # by Ctrl-C while the recorder starts
     try:
         with suppress(KeyboardInterrupt), recorder(operator, bag, namespace) as recording:
             stopped = operator.watch_stops()
 
-            def explore(request: ExplorationRequest) -> tuple[ExplorationError, str]:
+            def keep(exploration_id: str) -> None:
                 nonlocal made, losses
+                with uninterrupted():  # a slide that was made is kept
+                    lost = recording.wait_for(exploration_id)
+                    made += 1
+                if lost != losses:
+                    losses = lost
+                    _print_progress(losses, made)
+
+            def explore(request: ExplorationRequest) -> tuple[ExplorationError, str]:
                 recording.check()
                 try:
                     explored = operator.explore(request, stopped=stopped)
                 except (MotionRefused, MotionAborted) as error:
                     return error.error, str(error)
+                except Interrupted as stop:
+                    if stop.completed:
+                        keep(stop.completed)
+                    raise
                 if explored.success:
-                    lost = recording.wait_for(explored.exploration_id)
-                    made += 1
-                    if lost != losses:
-                        losses = lost
-                        _print_progress(losses, made)
+                    keep(explored.exploration_id)
                 return explored.error, explored.message
 
-            end = collection.collect(plan, params, explore, partial(_evaluate_bag, bag, surface), _print_progress)
+            def evaluate() -> collection.PlaceAccuracy:
+                return collection.evaluate_places(_features_of(folder), surface)
+
+            end = collection.collect(plan, params, explore, evaluate, _print_progress)
             if recording.end and end.error is not CollectionError.NOT_RECORDED:  # in the last evaluation, say
                 end = replace(end, error=CollectionError.NOT_RECORDED, message=f'{recording.end}; {end.message}')
     except LaunchFailed:  # the recorder was not discovered
@@ -366,14 +365,6 @@ def _print_progress(sentence: str, slides: int) -> None:
     print(f'{slides} slide{"s" * (slides != 1)}: {sentence}', flush=True)
 
 
-def _evaluate_bag(bag: Path, surface: str, _slides: int) -> collection.PlaceAccuracy:
-    """Evaluate all bags of the folder of a bag."""
-    from texture_evaluation.collection import evaluate_places
-
-    with unfinished_bags():
-        return evaluate_places(_features_of(bag.parent), surface)
-
-
 def _features_of(folder: Path) -> LabelledFeatures:
     """Return the features of the slides in all bags of a folder."""
     from texture_features.feature_set import FeatureSet
@@ -381,16 +372,6 @@ def _features_of(folder: Path) -> LabelledFeatures:
 
     feature_set = FeatureSet.load(RECIPE)
     return SlideDataset.from_bags([folder], topics=feature_set.topics).features(feature_set)
-
-
-@contextmanager
-def unfinished_bags() -> Iterator[None]:
-    """Read bags that are still recorded, without the warning that they have no end."""
-    BAGS_LOG.disabled = True
-    try:
-        yield
-    finally:
-        BAGS_LOG.disabled = False
 
 
 class RecorderProcess(Child):
@@ -427,25 +408,32 @@ class RecorderProcess(Child):
 def recorder(operator: Operator, bag: Path, namespace: str) -> Iterator[RecorderProcess]:
     """Record a bag of what the explorer watches, once it holds what the nodes send."""
     [topics] = operator.parameters('explorer', ('signal_topics',))
-    with (
-        tempfile.TemporaryDirectory() as log,
-        RecorderProcess(bag, namespace, Path(log) / 'record.log', topics) as recording,
-    ):
-        operator.wait_until(
-            lambda: records(bag, recording.check),
-            RECORDER_S,
-            f'the recorder has received no {" and ".join(RECORDED)} yet; look at the output of sensor and explorer',
-        )
-        yield recording
+    ours = f'/{namespace}/'.replace('//', '/')
+    wanted = {*(topic.removeprefix(ours) for topic in topics.split()), 'exploration'}
+    BAGS_LOG.disabled = True  # a bag that is still recorded has no end, of which reading would warn
+    try:
+        with (
+            tempfile.TemporaryDirectory() as log,
+            RecorderProcess(bag, namespace, Path(log) / 'record.log', topics) as recording,
+        ):
+            operator.wait_until(
+                lambda: records(bag, namespace, wanted, recording.check),
+                RECORDER_S,
+                f'the recorder has not received {" and ".join(sorted(wanted))} yet; look at the output of sensor and '
+                'explorer',
+            )
+            yield recording
+    finally:
+        BAGS_LOG.disabled = False
 
 
-def records(bag: Path, check: Callable[[], None]) -> bool:
-    """Return whether a bag that is being recorded holds all of `RECORDED`: the idle explorer reports once a second."""
+def records(bag: Path, namespace: str, wanted: set[str], check: Callable[[], None]) -> bool:
+    """Return whether a bag that is being recorded holds all topics: the idle explorer reports once a second."""
     from texture_recordings.bags import topics_in
 
     check()
-    with unfinished_bags(), suppress(InvalidData):  # nothing is written yet
-        return set(RECORDED) <= {name.rpartition('/')[2] for name in topics_in(bag)}
+    with suppress(InvalidData):  # nothing is written yet
+        return wanted <= set(topics_in(bag, namespace))
     return False
 
 
@@ -490,7 +478,7 @@ def _collect(options: argparse.Namespace) -> int:
             folder.rmdir()
     kept = f"; {end.slides} slide{'s' * (end.slides != 1)} in '{bag}'" if bag else ''
     if end.error not in (CollectionError.NONE, CollectionError.BOUND_MISSED):
-        following = folder / next_bag([one.name for one in folder.glob('*')], options.surface)
+        following = next_bag(folder, options.surface)
         kept += f"; continue at other places with --seed {params.seed + 1}, into '{following}'"
     print(f'{end.message}{kept}', file=sys.stderr if end.error else sys.stdout)
     if end.error is CollectionError.CANCELLED:

@@ -15,15 +15,9 @@ from texture_core.errors import InvalidParameter
 # --------------------
 # Services without values, each an `std_srvs/Trigger`.
 
+STOP = 'explorer/stop'  # whose answer is not waited for as long
 EXPLORER_MISSING = 'start an explorer, such as the emulator with `texture launch emulator`, or give its --namespace'
 TOUCHES_MISSING = "the launch files 'ur' and 'ros_controllers' offer it; start one of them, or give its --namespace"
-
-
-def _stop(options: argparse.Namespace) -> int:
-    with Operator(options.namespace) as operator:
-        success, message = operator.stop()
-    print(message)
-    return 0 if success else 1
 
 
 def trigger(summary: str, service: str, advice: str = EXPLORER_MISSING) -> Command:
@@ -31,14 +25,14 @@ def trigger(summary: str, service: str, advice: str = EXPLORER_MISSING) -> Comma
 
     def run(options: argparse.Namespace) -> int:
         with Operator(options.namespace) as operator:
-            success, message = operator.call(service, advice)
+            success, message = operator.stop() if service == STOP else operator.call(service, advice)
         print(message)
         return 0 if success else 1
 
     return Command(summary, add_namespace, run)
 
 
-stop = Command('end the exploration and lift the finger, from any phase', add_namespace, _stop)
+stop = trigger('end the exploration and lift the finger, from any phase', STOP)
 recover = trigger('free the arm from a fault', 'explorer/recover')
 lift = trigger('lift a finger that was left pressed on the surface', 'explorer/lift')
 touch_surface = trigger('take one touch of the surface calibration', 'explorer/touch_surface', TOUCHES_MISSING)

@@ -12,9 +12,10 @@ import platform
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
+from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from types import ModuleType
 
 import yaml
 
@@ -39,21 +40,9 @@ def table(rows: Iterable[Row]) -> str:
 # List what can be chosen.
 
 
-def _catalogue(module: ModuleType) -> list[Row]:
+def _catalogue(module: str) -> list[Row]:
     """Return each name of a catalogue with the comment next to it in the source."""
-    return re.findall(r"^    '(\w+)': .*  # (.+)$", inspect.getsource(module), re.MULTILINE)
-
-
-def _sensors() -> Iterable[Row]:
-    from texture_drivers import catalogue
-
-    return _catalogue(catalogue)
-
-
-def _arms() -> Iterable[Row]:
-    from texture_exploration.arms import catalogue
-
-    return _catalogue(catalogue)
+    return re.findall(r"^    '(\w+)': .*  # (.+)$", inspect.getsource(import_module(module)), re.MULTILINE)
 
 
 def _motions() -> Iterator[Row]:
@@ -87,9 +76,9 @@ def _surfaces() -> Iterator[Row]:
 
 
 LISTS: Mapping[str, tuple[str, Callable[[], Iterable[Row]]]] = {
-    'sensors': ('what `sensor:=` of a launch takes', _sensors),
+    'sensors': ('what `sensor:=` of a launch takes', partial(_catalogue, 'texture_drivers.catalogue')),
     'motions': ('what `texture explore` takes, with default and range of each number', _motions),
-    'arms': ('what the parameter `arm` of the explorer takes', _arms),
+    'arms': ('what `arm` of the explorer takes', partial(_catalogue, 'texture_exploration.arms.catalogue')),
     'recipes': ('what `texture train` takes', _recipes),
     'surfaces': ('what the emulator simulates, by scene', _surfaces),
 }

@@ -15,7 +15,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from texture_bringup.feed import FRAME_PERIOD_S, Feed, in_words
+from texture_bringup.feed import FRAME_PERIOD_S, UNKNOWN, Feed, in_words
 from texture_core.cli import add_namespace
 from texture_core.errors import ExplorationError
 from texture_core.types import NANOSECONDS
@@ -141,10 +141,6 @@ def line(frame: Frame) -> str:
 
 def finger_text(state: Mapping[str, Any]) -> str:
     """Return speed, force, motion and error of a frame as text."""
-    numbers = [
-        f'{state[name]:.{digits}f} {unit}'
-        for name, digits, unit in (('speed_m_s', 3, 'm/s'), ('force_n', 2, 'N'))
-        if state[name] is not None
-    ]
+    numbers = [text for text in (state['speed'], state['force']) if text != UNKNOWN]
     error = in_words(ExplorationError(state['error_code'])) if state['error_code'] else ''
     return '  '.join([*numbers, *filter(None, [state['motion'], error])]) or 'no exploration'

@@ -22,7 +22,7 @@ from std_srvs.srv import Trigger
 from texture_msgs import msg
 
 from texture_bringup.dashboard import Access, Recorder, Serving, make_app
-from texture_bringup.feed import FRAME_PERIOD_S, Feed
+from texture_bringup.feed import FRAME_PERIOD_S, Feed, number_text
 from texture_bringup.operator import NOT_STOPPED, STOP_S, Operator, subscribe
 from texture_core.config import folder, from_mapping, param
 from texture_core.errors import InvalidData, InvalidParameter, LaunchFailed, MotionRefused
@@ -67,7 +67,9 @@ class DashboardNode(Node):
         self._serving = Serving(
             make_app(self, access, folder('texture_bringup', 'config/dashboard')), params.host, params.port
         )
-        self._subscribe()
+        subscribe(self, self._feed, self._on_bad)
+        qos = quality_of_service('explorer_info')
+        self.create_subscription(msg.ExplorerInfo, 'explorer_info', partial(setattr, self, '_info'), qos)
         self.create_timer(FRAME_PERIOD_S, self._show)
         Diagnostics(self, self._report)
         # On the terminal alone, as a log would keep the token.
@@ -164,15 +166,10 @@ class DashboardNode(Node):
         motions: dict[str, list[dict[str, Any]]] = {name: [] for name in self._info.motions}
         for one in self._info.numbers:
             number = {'name': one.field, 'default': one.default_value, 'low': one.low, 'high': one.high}
-            motions[one.motion].append({**number, 'unit': one.unit})
+            motions[one.motion].append({**number, 'text': number_text(one.field, one.unit, one.low, one.high)})
         return motions
 
     # ROS
-
-    def _subscribe(self) -> None:
-        subscribe(self, self._feed, self._on_bad)
-        qos = quality_of_service('explorer_info')
-        self.create_subscription(msg.ExplorerInfo, 'explorer_info', partial(setattr, self, '_info'), qos)
 
     def _on_bad(self, error: InvalidData) -> None:
         self._bad += 1

@@ -171,10 +171,12 @@ class Classifier(EstimatorNode):
         return replace(super()._predict(vector), revision=self._revision)
 
     def _on_state(self, state: msg.ExplorationState) -> None:
-        if state.exploration_id not in ('', self._exploration_id):
-            self._exploration_id = state.exploration_id
-            if self._incremental_classifier is not None:
-                self._incremental_classifier.begin(state.exploration_id)
+        exploration_id, before = state.exploration_id, self._exploration_id
+        self._exploration_id = exploration_id or before
+        if self._incremental_classifier is not None and exploration_id not in ('', before):
+            self._incremental_classifier.begin(exploration_id)
+        if self._incremental_classifier is not None and state.phase == msg.ExplorationState.PHASE_ABORTED:
+            self._incremental_classifier.abort(exploration_id)
 
     def _change(self, params: EstimatorParams) -> None:
         super()._change(params)

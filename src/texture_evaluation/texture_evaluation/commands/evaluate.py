@@ -90,11 +90,8 @@ def _cross_validate(options: argparse.Namespace) -> int:
     with dask_backend(options.dask) if options.dask else nullcontext():
         jobs = None if options.dask else options.jobs
         results = [cross_validate(recipe, dataset, split.splitter, jobs, groups=split.groups) for recipe in recipes]
-    for line in (line for result in results for line in table(result, split.name)):
-        print(line)
     compared = [compare(results[0], other) for other in results[1:]]
-    for one in compared:
-        print(sentence(one))
+    print('\n'.join([*(line for result in results for line in table(result, split.name)), *map(sentence, compared)]))
     if options.json:
         figures = [result.as_json() for result in results]
         several = {'recipes': figures, 'comparisons': [vars(one) for one in compared]}

@@ -44,8 +44,7 @@ def run(options: argparse.Namespace) -> int:
     if options.recipe in shipped('texture_estimation', 'config/roughness'):
         raise InvalidParameter(f"recipe '{options.recipe}' learns grades of roughness; give them with --grades FILE")
     model = train_from_bags(options.recipe, options.bags, options.slides, options.out, namespace=options.namespace)
-    for line in summary(model, Path(options.out)):
-        print(line)
+    print('\n'.join(summary(model, Path(options.out))))
     return 0
 
 
