@@ -10,7 +10,7 @@ import numpy as np
 
 from texture_core.types import NANOSECONDS, Array, FeatureVector, Rejection, TextureEstimate
 from texture_estimation.acceptance import SlideDistance, margin_of
-from texture_estimation.domain import OUTSIDE
+from texture_estimation.domain import LOUDER, OUTSIDE
 from texture_estimation.evidence_rules import GroupedEvidence, followed
 from texture_estimation.learners.learner import trust
 from texture_estimation.model import INVERSE_TEMPERATURE, TextureModel
@@ -148,7 +148,7 @@ class EvidenceAccumulator:
         rejection, decided = acceptance.assess(margin, distance, self._effective_windows)
         deviation = self._deviation
         if not deviation and model.labels[best] in acceptance.domain.quiet_labels:
-            deviation = f'{OUTSIDE}: slides of {model.labels[best]} are as quiet as the sensor at rest'
+            deviation = f'{OUTSIDE}: slides of {model.labels[best]} are as quiet as the sensor at rest; {LOUDER}'
         if deviation:
             rejection = Rejection.OUTSIDE_TRAINING
         elif not single and rejection is Rejection.NONE:

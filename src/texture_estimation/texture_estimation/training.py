@@ -17,7 +17,7 @@ from scipy.optimize import minimize_scalar
 from texture_core.errors import InvalidData
 from texture_core.types import AnyArray, Array
 from texture_estimation.acceptance import Acceptance, HeldOutSlide
-from texture_estimation.domain import UNFELT, Domain
+from texture_estimation.domain import LOUDER, UNFELT, Domain
 from texture_estimation.evidence_rules import EvidenceRule, followed
 from texture_estimation.gaussians import ClassDistance, compared_start
 from texture_estimation.learners.learner import (
@@ -40,7 +40,7 @@ from texture_estimation.model import TextureModel, TrainingExamples
 from texture_estimation.next_motion import NextTouchModel
 from texture_estimation.recipe import Recipe
 from texture_features.augmentation import NOISE
-from texture_features.feature_set import LOAD, FeatureCopies, LabelledFeatures, SlideConditions
+from texture_features.feature_set import LEAST_AT_REST, LOAD, FeatureCopies, LabelledFeatures, SlideConditions
 
 # --------------------
 # Fit the learner of a recipe to labelled windows, with what else the recipe trains it on.
@@ -431,11 +431,24 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
             'calibration': calibrated.note,
             'held_out_window_accuracy': accuracy,
             'quiet': [
-                f"{counts[label]} of {domain.slides[label]} slides of '{label}' are {why}: {UNFELT}; they are rejected"
+                f"{counts[label]} of {domain.slides[label]} slides of '{label}' are {why}: {UNFELT}; rejected; "
+                + LOUDER
                 for label, why in dict(quiet).items()
-            ],
+            ]
+            if domain.rest
+            else [f'{_unknown_rest(recipe)}: a finger that feels nothing cannot be told from a quiet surface'],
         },
         examples=TrainingExamples.of(examples.values, codes),
+    )
+
+
+def _unknown_rest(recipe: Recipe) -> str:
+    """Return why it is unknown how quiet the sensor is at rest."""
+    unknown = recipe.feature_set.unknown_levels
+    return (
+        f'no feature is the power of {", ".join(unknown)}'
+        if unknown
+        else f'no approach of {LEAST_AT_REST} samples was recorded'
     )
 
 
