@@ -3,9 +3,11 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from texture_estimation.domain import Domain
+from texture_features.correction import Correction
 from texture_features.feature_set import SlideConditions
 
 
@@ -121,6 +123,13 @@ def test_a_channel_that_is_louder_than_at_rest_or_not_known_may_show_the_touch_a
     assert both.deviation(as_loud(pac=10.0)) == ''  # as after a change of the names of the channels
     slow = trained_on(as_loud(pdc=1.0, rest={'pdc': 1.0}))
     assert 'as quiet as the sensor at rest, signal_static/pdc 1, at rest 1' in slow.deviation(as_loud(pdc=1.0))
+
+
+def test_the_noise_at_rest_of_another_finger_is_compared_as_it_is_corrected():
+    half = Correction({'signal': np.array([100.0])}, {'signal': np.array([[20.0 * math.log10(0.5)]])})
+    domain = trained_on(as_loud(pac=10.0, pdc=1.0, rest={'pac': 10.0, 'pdc': 1.0})).corrected(half)
+    assert domain.rest == {FEATURES['pac']: pytest.approx(20.0), FEATURES['pdc']: 1.0}
+    assert 'signal/pac 25, at rest 20' in domain.deviation(as_loud(pac=25.0, pdc=1.0))
 
 
 def test_added_slides_widen_the_domain():

@@ -12,7 +12,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from texture_core.errors import InvalidData
-from texture_features.feature_set import LOAD, POWER, RunningConditions, SlideConditions
+from texture_features.correction import Correction
+from texture_features.feature_set import AGAIN, LOAD, POWER, SlideConditions
 from texture_features.windows import Interval
 
 # --------------------
@@ -99,12 +100,13 @@ class Domain:
     def of_slides(cls, conditions: Iterable[SlideConditions], labels: Iterable[str]) -> Domain:
         """Return the domain of a model that is trained on slides, with the usual margins."""
         slides, labels = tuple(conditions), tuple(labels)
+        turning = any(slide.motion in TURNING_MOTIONS for slide in slides)  # such a motion has all directions
         return cls(
             motions=_names(slide.motion for slide in slides),
             sensors=_names(slide.sensor for slide in slides if not slide.sensor.startswith(REPLAYS)),
             speed_m_s=interval_of((slide.speed_m_s, *slide.speed_range_m_s) for slide in slides),
             force_n=interval_of((slide.force_n, *slide.force_range_n) for slide in slides),
-            directions_rad=_directions(slides),
+            directions_rad=() if turning else tuple(sorted({angle for one in slides for angle in one.directions_rad})),
             levels=_levels(slides),
             rest=_rest(slides),
             slides=dict(Counter(labels)),
@@ -133,7 +135,13 @@ class Domain:
             slides=dict(Counter(self.slides) + Counter(new.slides)),
         )
 
-    def deviation(self, conditions: SlideConditions | RunningConditions) -> str:
+    def corrected(self, correction: Correction) -> Domain:
+        """Return the domain for another finger, whose noise is amplified by its correction; the load is not."""
+        gains = {name: correction.noise_gain(POWER.split(name)[0].partition(AGAIN)[0]) for name in self.rest}
+        rest = {name: level if name.endswith(LOAD) else level * gains[name] for name, level in self.rest.items()}
+        return replace(self, rest=rest)
+
+    def deviation(self, conditions: SlideConditions) -> str:
         """Return how an exploration lies outside this domain, in one sentence; '' if it lies within."""
         found, speed, force = list[str](), conditions.speed_m_s, conditions.force_n
         if is_beyond(speed, self.speed_m_s, self.speed_margin):
@@ -160,20 +168,13 @@ class Domain:
             found.append(f'{quiet}: {UNFELT}')
         return f'{OUTSIDE}: {"; ".join(found)}' if found else ''
 
-    def quiet(self, conditions: SlideConditions | RunningConditions) -> str:
+    def quiet(self, conditions: SlideConditions) -> str:
         """Return that all channels of an exploration are as quiet as the sensor at rest; '' if not, or if unknown."""
         levels = {name: level for name, level, *_ in conditions.levels}
         if not self.rest or any(levels.get(name, math.inf) >= QUIET * rest for name, rest in self.rest.items()):
             return ''
         name, rest = next(iter(self.rest.items()))
         return f'as quiet as the sensor at rest, {POWER.sub("", name)} {levels[name]:.3g}, at rest {rest:.3g}'
-
-
-def _directions(slides: Sequence[SlideConditions]) -> tuple[float, ...]:
-    """Return the directions of slides; none where a motion has all of them."""
-    if any(slide.motion in TURNING_MOTIONS for slide in slides):
-        return ()
-    return tuple(sorted({angle for slide in slides for angle in slide.directions_rad}))
 
 
 def _places(slides: Sequence[SlideConditions], labels: Sequence[str]) -> int:
@@ -188,22 +189,19 @@ def _places(slides: Sequence[SlideConditions], labels: Sequence[str]) -> int:
 
 def _levels(slides: Sequence[SlideConditions]) -> dict[str, Interval]:
     """Return the range of each level that is compared."""
-    by_name: defaultdict[str, list[list[float]]] = defaultdict(list)
-    for slide in slides:
-        for name, *means in slide.levels:
-            if any(compared in name for compared in COMPARED):
-                by_name[name].append(means)
-    found = {name: interval_of(means) for name, means in by_name.items()}
-    return {name: interval for name, interval in found.items() if interval is not None}
+    means: defaultdict[str, list[list[float]]] = defaultdict(list)
+    for name, *of_slide in (level for slide in slides for level in slide.levels):
+        if any(compared in name for compared in COMPARED):
+            means[name].append(of_slide)
+    return {name: interval for name, each in means.items() if (interval := interval_of(each))}
 
 
 def _rest(slides: Sequence[SlideConditions]) -> dict[str, float]:
     """Return the median level of each feature of a power before the touch, of the slides that show it."""
-    by_name: defaultdict[str, list[float]] = defaultdict(list)
-    for slide in slides:
-        for name, level in slide.rest:
-            by_name[name].append(level)
-    return {name: float(np.median(levels)) for name, levels in by_name.items()}
+    levels: defaultdict[str, list[float]] = defaultdict(list)
+    for name, level in (level for slide in slides for level in slide.rest):
+        levels[name].append(level)
+    return {name: float(np.median(each)) for name, each in levels.items()}
 
 
 def _names(names: Iterable[str]) -> tuple[str, ...]:

@@ -72,10 +72,8 @@ class EvidenceAccumulator:
         if vector.last:
             self._over = True
             if vector.skipped and not self._message:
-                windows = vector.skipped + self._windows
-                self._message = (
-                    f'{vector.skipped} of {windows} windows were left out, as samples were lost or not finite'
-                )
+                left_out = f'{vector.skipped} of {vector.skipped + self._windows} windows were left out'
+                self._message = f'{left_out}, as samples were lost or not finite'
         elif self.model is not None:
             self._predict(vector, self.model)
         return self._estimate(vector)
@@ -108,7 +106,7 @@ class EvidenceAccumulator:
             self._message = f"a window was left out: its feature '{bad}' is not finite"
             return
         self._conditions.update(vector)
-        self._deviation = model.active_acceptance.domain.deviation(self._conditions)
+        self._deviation = model.active_acceptance.domain.deviation(self._conditions.get())
         scores, compared = model.predict_and_compare(vector.values)
         self._windows += 1
         self._window_ns = round(vector.window_s * NANOSECONDS)

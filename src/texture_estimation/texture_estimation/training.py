@@ -125,7 +125,7 @@ def _augmented_examples(
         codes=classes[copied],
         groups=copied,
         rows=np.repeat(np.arange(len(copied)), _times(runs, examples, recipe.training.start_weight)),
-        gain_response=examples.augmented.gain_response,
+        gain_response=examples.augmented.gain_response(names),
         slide_deviations=means - centres[classes],
         slides=np.arange(len(names)),
         augmentation=recipe.augmentation,
@@ -294,9 +294,10 @@ def _reference_copies(examples: LabelledFeatures, names: Any, classes: Codes, ga
         return []
     rng = np.random.default_rng(0)
     widest, copies = math.log(gain_range), examples.augmented.copies
+    response = examples.augmented.gain_response(names)
     quiet = (copies.copies < REFERENCE_COPIES) & (copies.kinds != NOISE)
     return [
-        replace(copy, shift=rng.uniform(-widest, widest) * examples.augmented.gain_response)
+        replace(copy, shift=rng.uniform(-widest, widest) * response)
         for copy in _copied_slides(copies.select(quiet), names, classes)
     ]
 
@@ -391,6 +392,10 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
     quiet = [(label, why) for label, made in zip(of_slides, conditions, strict=True) if (why := domain.quiet(made))]
     counts = Counter(label for label, _ in quiet)
     domain = replace(domain, quiet_labels=tuple(label for label in counts if counts[label] == domain.slides[label]))
+    silent = ', '.join(recipe.feature_set.unknown_levels)
+    unknown = (
+        f'no feature is the power of {silent}' if silent else f'no approach of {LEAST_AT_REST} samples was recorded'
+    )
     acceptance = Acceptance(0 if fitted.held_out is None else len(slides), recipe.training.rates, domain)
     if not acceptance.reason:
         followed_slides = Followed(bound, examples)
@@ -436,19 +441,9 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
                 for label, why in dict(quiet).items()
             ]
             if domain.rest
-            else [f'{_unknown_rest(recipe)}: a finger that feels nothing cannot be told from a quiet surface'],
+            else [f'{unknown}: a finger that feels nothing cannot be told from a quiet surface'],
         },
         examples=TrainingExamples.of(examples.values, codes),
-    )
-
-
-def _unknown_rest(recipe: Recipe) -> str:
-    """Return why it is unknown how quiet the sensor is at rest."""
-    unknown = recipe.feature_set.unknown_levels
-    return (
-        f'no feature is the power of {", ".join(unknown)}'
-        if unknown
-        else f'no approach of {LEAST_AT_REST} samples was recorded'
     )
 
 

@@ -243,14 +243,14 @@ def test_the_level_at_rest_is_what_the_features_of_a_power_show_there() -> None:
     [
         ({'signal': ['moments'], 'signal_static': ['log_variance']}, []),
         ({'signal': ['hjorth'], 'signal#2': ['moments'], 'signal_static': ['mean']}, ['signal_static']),
-        ({'signal': ['mean_statistics'], 'signal_static': ['load_level']}, []),
+        ({'signal': ['mean_statistics'], 'signal_static': ['load_level']}, ['signal']),
         (
             {'finger0/signal': ['mean'], 'signal_static': ['log_difference_variance']},
             ['finger0/signal', 'signal_static'],
         ),
     ],
 )
-def test_topics_of_whose_power_no_feature_is_the_logarithm_are_known(inputs, unknown) -> None:
+def test_topics_of_which_no_feature_is_the_power_are_named(inputs, unknown) -> None:
     features = FeatureSet.from_mapping({'inputs': {topic: {'features': names} for topic, names in inputs.items()}})
     assert features.unknown_levels == unknown
     rest = {topic: (np.ones((20, 1)), 10.0, ('a',)) for topic in features.topics}

@@ -265,7 +265,7 @@ class FeatureSet:
 
     @property
     def unknown_levels(self) -> list[str]:
-        """Topics of whose power no feature is the logarithm: whether they show a touch is unknown."""
+        """Topics of which no feature is the log power: whether they show a touch is unknown."""
         known = {
             item.topics[0]
             for item in self.inputs
@@ -528,8 +528,8 @@ def _listed(inputs: dict[str, tuple[str, str]]) -> str:
 
 DIRECTION_DIGITS = 2  # so that a slide has few directions, however long it is
 # In the names of the features that are the logarithm of a power, of a channel as in
-# 'signal/moments/signal_log_power/dynamic', or of a whole array.
-POWER = re.compile(r'/(moments/signal_log_power|log_variance|mean_statistics/log_variance|load_level)(?=/|$)')
+# 'signal/moments/signal_log_power/dynamic', or of a whole array; a mean of logarithms would hide the touched taxels.
+POWER = re.compile(r'(?<!/mean_statistics)/(moments/signal_log_power|log_variance|load_level)(?=/|$)')
 LOAD = '/load_level'  # ends the name of the feature that holds the level of a whole array
 LEAST_AT_REST = 10  # samples before the touch that show a level
 
@@ -579,28 +579,13 @@ class RunningConditions:
         for _, place, log_power in self._powers or ():
             log_power.update(float(vector.values[place]))
 
-    @property
-    def speed_m_s(self) -> float:
-        """Mean speed so far; NaN if unknown."""
-        return self._speed.value
-
-    @property
-    def force_n(self) -> float:
-        """Mean force so far; NaN if unknown."""
-        return self._force.value
-
-    @property
-    def levels(self) -> Sequence[tuple[str, float]]:
-        """Features of a power and their levels so far."""
-        return [(name, _rms(power.value)) for name, _, power in self._powers or ()]
-
     def get(self) -> SlideConditions:
         """Return the conditions of the windows so far."""
         return SlideConditions(
             self.motion,
             self.sensor,
-            self.speed_m_s,
-            self.force_n,
+            self._speed.value,
+            self._force.value,
             tuple(self.directions_rad),
             self._speed.range,
             self._force.range,
@@ -641,7 +626,13 @@ class AugmentedFeatures:
 
     copies: FeatureCopies
     disturbed: FeatureCopies
-    gain_response: Array
+    gain_responses: Mapping[str, Array]  # by slide
+
+    def gain_response(self, slides: NDArray[np.str_]) -> Array:
+        """Return the mean change of each feature with the logarithm of the gain, of these slides."""
+        used = set(slides.tolist())
+        response: Array = np.mean([one for slide, one in self.gain_responses.items() if slide in used], axis=0)
+        return response
 
 
 # --------------------
