@@ -96,6 +96,18 @@ def test_the_picture_dots_what_is_before_the_first_estimate_and_has_times_below_
     assert all(panel.xaxis.get_tick_params()['labelbottom'] for panel in panels)
 
 
+def test_a_slide_that_lost_its_samples_says_so_in_the_table_and_in_its_panel(tmp_path, monkeypatch) -> None:
+    figure, message = Figure(), 'no window could be used: its samples were lost'
+    monkeypatch.setattr(demo, 'chart', lambda *_: nullcontext(figure))
+    end = TextureEstimate(0, 'a', '', Rejection.TOO_LITTLE_EVIDENCE, message=message)
+    answer = ExplorationResult(ExplorationError.NONE, '', 'a', end, RoughnessEstimate(0, 'a'))
+    slide = Slide('cardboard', 'cardboard', UNKNOWN, answer, [])
+    assert (slide.as_expected, slide.outcome) == (False, f'no answer: {message}')
+    demo.draw([slide], tmp_path / 'demo.png')
+    panel = figure.axes[0]
+    assert (panel.get_title(), [text.get_text() for text in panel.texts]) == ('cardboard\nno answer', [message])
+
+
 def page_at(address: str) -> bytes:
     """Return a page, or nothing if no server answers yet."""
     try:
@@ -108,6 +120,7 @@ def page_at(address: str) -> bytes:
 ENDS = {
     'aborted': (ExplorationError.ARM_FAULT, Rejection.NO_MODEL),
     'novel': (ExplorationError.NONE, Rejection.NOVEL),
+    'lost': (ExplorationError.NONE, Rejection.TOO_LITTLE_EVIDENCE),
     'good': (ExplorationError.NONE, Rejection.NONE),
 }
 
@@ -120,6 +133,7 @@ ENDS = {
         (['novel', 'aborted', 'good'], ACCEPTED, 'good'),
         (['aborted'] * ATTEMPTS, ACCEPTED, 'aborted'),
         (['novel'], UNKNOWN, 'novel'),
+        (['lost', 'novel'], UNKNOWN, 'novel'),
         (['good'], UNKNOWN, 'good'),  # a wrong label is never asked again
     ],
 )
@@ -130,7 +144,7 @@ def test_an_aborted_slide_and_a_rejected_one_over_a_trained_surface_are_made_aga
 
     def explore(_request, _on_progress):
         error, rejection = ENDS[name := next(made)]
-        estimate = TextureEstimate(0, name, 'felt', rejection)
+        estimate = TextureEstimate(0, name, '' if name == 'lost' else 'felt', rejection)
         return ExplorationResult(error, f'it {name}', name, estimate, RoughnessEstimate(0, ''))
 
     operator = SimpleNamespace(explore=explore, set_parameters=lambda *_: None)

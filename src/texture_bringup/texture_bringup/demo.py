@@ -119,6 +119,8 @@ class Slide:
             return self.answer.message
         if estimate.rejection is Rejection.OUTSIDE_TRAINING:
             return f'rejected, {estimate.message}'
+        if not estimate.label:
+            return f'no answer: {estimate.message}'
         if estimate.rejection is not Rejection.NONE:
             return f'rejected, {in_words(estimate.rejection)} (nearest: {estimate.label})'
         grade = f'; roughness {roughness.grade:.1f} of 5' if roughness.valid else ''
@@ -234,9 +236,8 @@ def _train(out: Path, recipe: str, seed: int) -> None:
     (out / GRADES).write_text('\n'.join(['texture,grade', *rows, '']))
     with task('training the roughness model'):
         train_grades_from_bags('roughness', bags, out / GRADES, out=out / ROUGHNESS)
-    reasons = (model.acceptance.reason, model.acceptance.decided_reason)
     line(f'trained on {len(TRAINED)} surfaces: {", ".join(TRAINED)}')
-    for reason in filter(None, reasons):
+    for reason in filter(None, (model.acceptance.reason, model.acceptance.decided_reason)):
         line(reason)
 
 
@@ -273,8 +274,8 @@ def _explore(operator: Operator) -> list[Slide]:
 def slide_over(operator: Operator, request: ExplorationRequest, title: str, expected: frozenset[Rejection]) -> Slide:
     """Put the surface of a request under the finger and slide.
 
-    A slide that is aborted, or rejected over a trained surface, is made again, twice at most: by its calibration the
-    model rejects one slide in 25.
+    A slide that is aborted, lost all samples, or is rejected over a trained surface is made again, twice at most: by
+    its calibration the model rejects one slide in 25.
     """
     operator.set_parameters('emulator', {'surface': request.surface})
     estimates: list[TextureEstimate] = []
@@ -283,7 +284,7 @@ def slide_over(operator: Operator, request: ExplorationRequest, title: str, expe
         answer = operator.explore(request, lambda _state, texture: estimates.append(texture))
         made = Slide(request.surface, title, expected, answer, estimates)
         rejected = expected == ACCEPTED and answer.texture.rejection is not Rejection.NONE
-        if not left or (made.ended and not rejected):
+        if not left or (made.ended and not rejected and (answer.texture.label or not expected)):
             break
         line(f'· {title:<28}{made.outcome}; this try does not count, trying again')
     return made
@@ -341,8 +342,11 @@ def _draw_slide(axis: Any, slide: Slide) -> None:
         # No estimate before the first window: from as probable as any other.
         before_s, before = (0.0, *seconds[:1]), (1.0 / len(final.probabilities), *values[:1])
         axis.plot(before_s, before, color=colour, linestyle=':', linewidth=1.0, zorder=above)
-    nearest = f'\nnearest: {final.label}' if final.label else ''
-    reason = in_words(final.rejection)
-    verdict = f'accepted: {final.label}' if accepted else f'rejected: {reason}{nearest}'
+    verdict = (
+        f'accepted: {final.label}' if accepted else f'rejected: {in_words(final.rejection)}\nnearest: {final.label}'
+    )
+    if not final.label:
+        verdict = 'no answer'
+        axis.text(0.02, 0.5, final.message, transform=axis.transAxes, va='center', wrap=True)
     axis.set_title(f'{slide.title}\n{verdict}', color=COLOURS[2] if accepted else COLOURS[5])
     axis.set_ylim(0.0, 1.05)

@@ -3,9 +3,11 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from texture_estimation.domain import Domain
+from texture_features.correction import Correction
 from texture_features.feature_set import SlideConditions
 
 
@@ -82,34 +84,52 @@ def test_to_and_fro_is_trained_if_both_directions_are():
     assert TRAINED.deviation(both) == 'outside the training: direction 180°, trained 0°'
 
 
-def at_level(rms, channel='signal/pac', **known):
-    return SlideConditions(levels=((channel, rms, rms, rms),), **known)
+FEATURES = {'pac': 'signal/moments/signal_log_power/pac', 'pdc': 'signal_static/log_variance/pdc'}
+
+
+def as_loud(rest=None, **levels):
+    """Return a slide with a level of each channel and, where the approach was recorded, its level at rest."""
+    return SlideConditions(
+        levels=tuple((FEATURES[channel], rms, rms, rms) for channel, rms in levels.items()),
+        rest=tuple((FEATURES[channel], rms) for channel, rms in (rest or {}).items()),
+    )
 
 
 @pytest.mark.parametrize(('rms', 'within'), [(2.1, True), (1.9, False), (15.9, True), (16.1, False)])
 def test_a_signal_far_stronger_or_weaker_than_any_trained_is_outside(rms, within):
-    domain = trained_on(at_level(4.0), at_level(8.0))
+    domain = trained_on(as_loud(pac=4.0, pdc=1.0), as_loud(pac=8.0, pdc=1.0))
     sentence = f'outside the training: signal level {rms:.3g} of signal/pac, trained 4 to 8'
-    assert domain.deviation(at_level(rms)) == ('' if within else sentence)
-    assert domain.deviation(at_level(rms, 'signal/other')) == ''
+    assert domain.deviation(as_loud(pac=rms)) == ('' if within else sentence)
+    assert domain.deviation(as_loud(pdc=100.0)) == ''  # of slow channels the level is not compared
 
 
 def test_a_slide_that_adds_less_power_than_the_sensor_has_at_rest_is_outside_where_that_is_known():
-    noise = at_level(10.0, rest=(('signal/pac', 10.0),))
-    domain = trained_on(noise, at_level(30.0, rest=(('signal/pac', 12.0),)))  # 11 at rest, on average
+    noise = as_loud(pac=10.0, rest={'pac': 10.0})
+    domain = trained_on(noise, as_loud(pac=30.0, rest={'pac': 12.0}))  # 11 at rest, on average
     sentence = (
         'outside the training: as quiet as the sensor at rest, signal/pac 15.5, at rest 11: a finger that feels '
         'nothing shows the same'
     )
-    assert domain.deviation(at_level(15.5)) == sentence  # 15.56 is √2 times as much
-    assert domain.deviation(at_level(15.6)) == ''
-    assert trained_on(noise, at_level(30.0)).rest == {'signal/pac': 10.0}  # of the slides that show it
-    assert trained_on(at_level(10.0)).deviation(at_level(10.0)) == ''
-    other = (('signal/pac', 10.0), ('signal/new', 9.0))  # as after a change of the names of the channels
-    assert trained_on(noise, at_level(30.0, rest=other)).rest == {'signal/pac': 10.0, 'signal/new': 9.0}
-    # A channel that is louder, or of which the level is no feature, may show the touch.
-    both = trained_on(at_level(10.0, rest=(('signal/pac', 10.0), ('signal/pdc', 1.0))))
-    assert both.deviation(at_level(10.0)) == ''
+    assert domain.deviation(as_loud(pac=15.5)) == sentence  # 15.56 is √2 times as much
+    assert domain.deviation(as_loud(pac=15.6)) == ''
+    assert trained_on(noise, as_loud(pac=30.0)).deviation(as_loud(pac=14.0))  # by the slides that show it
+    assert trained_on(as_loud(pac=10.0)).deviation(as_loud(pac=10.0)) == ''
+
+
+def test_a_channel_that_is_louder_than_at_rest_or_not_known_may_show_the_touch_also_a_slow_one():
+    both = trained_on(as_loud(pac=10.0, pdc=1.0, rest={'pac': 10.0, 'pdc': 1.0}))
+    assert 'as quiet as the sensor at rest, signal/pac 10, at rest 10' in both.deviation(as_loud(pac=10.0, pdc=1.4))
+    assert both.deviation(as_loud(pac=10.0, pdc=1.5)) == ''
+    assert both.deviation(as_loud(pac=10.0)) == ''  # as after a change of the names of the channels
+    slow = trained_on(as_loud(pdc=1.0, rest={'pdc': 1.0}))
+    assert 'as quiet as the sensor at rest, signal_static/pdc 1, at rest 1' in slow.deviation(as_loud(pdc=1.0))
+
+
+def test_the_noise_at_rest_of_another_finger_is_compared_as_it_is_corrected():
+    half = Correction({'signal': np.array([100.0])}, {'signal': np.array([[20.0 * math.log10(0.5)]])})
+    domain = trained_on(as_loud(pac=10.0, pdc=1.0, rest={'pac': 10.0, 'pdc': 1.0})).corrected(half)
+    assert domain.rest == {FEATURES['pac']: pytest.approx(20.0), FEATURES['pdc']: 1.0}
+    assert 'signal/pac 25, at rest 20' in domain.deviation(as_loud(pac=25.0, pdc=1.0))
 
 
 def test_added_slides_widen_the_domain():
@@ -120,5 +140,5 @@ def test_added_slides_widen_the_domain():
     assert wider.deviation(conditions()) == ''
     assert wider.deviation(conditions(0.2)) == 'outside the training: speed 0.2 m/s, trained 0.045 to 0.1 m/s'
     assert wider.slides == {'cork': 2, 'oak': 1}
-    louder = trained_on(at_level(4.0)).widened([at_level(40.0)], ['oak'])
-    assert louder.levels == {'signal/pac': (4.0, 40.0)}
+    louder = trained_on(as_loud(pac=4.0)).widened([as_loud(pac=40.0)], ['oak'])
+    assert louder.levels == {FEATURES['pac']: (4.0, 40.0)}

@@ -13,6 +13,7 @@ from texture_msgs import msg, srv
 from texture_core.errors import ModelMismatch
 from texture_core.ros import ESTIMATE_QOS, FEATURE_QOS, from_msg, to_msg
 from texture_core.ros_testing import LocalGraph
+from texture_core.types import Rejection
 from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.model import load_model
 from texture_estimation.nodes.classifier import IN_PART, Classifier
@@ -139,13 +140,20 @@ def test_broken_messages_are_counted_and_survived(graph, case):
     assert node.report()[2]['invalid_messages'] == 1
 
 
-def test_an_estimate_without_all_vectors_of_its_exploration_says_so_and_the_next_one_is_whole(graph, case):
+def test_an_estimate_without_all_vectors_of_its_exploration_is_rejected_and_the_next_one_is_whole(graph, case):
     kind, path, vectors = case
     node = NodeUnderTest(graph, kind, path)
     whole = node.ask(vectors)
     assert node.report()[2]['lost_vectors'] == 0
     part = node.ask(vectors[1:], first=1)  # the node was found after the first vector
     assert all(estimate.message.startswith(IN_PART) for estimate in part)
+    if kind is Classifier:
+        assert (whole[-1].accepted, part[-1].label) == (True, whole[-1].label)
+        assert part[-1].rejection is Rejection.TOO_LITTLE_EVIDENCE
+        assert not any(one.accepted or one.decided or one.prediction_set for one in part)
+    else:
+        assert whole[-1].valid
+        assert not any(estimate.valid for estimate in part)
     assert (node.report()[0], node.report()[2]['lost_vectors']) == ('WARN', 1)
     node.features.publish(to_msg(vectors[0]))
     assert node.ask(vectors[1:])[-1].message.startswith(IN_PART)  # another extractor, amidst the exploration

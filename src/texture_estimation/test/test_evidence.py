@@ -91,7 +91,10 @@ def test_a_label_of_slides_as_quiet_as_the_sensor_at_rest_is_rejected_and_others
     quiet = with_acceptance(unlimited(model), domain=Domain(quiet_labels=('felt',)))
     for estimate in predict(quiet, vectors(examples)):
         assert (estimate.accepted, estimate.decided, estimate.label) == (False, False, 'felt')
-        assert estimate.message == 'outside the training: slides of felt are as quiet as the sensor at rest'
+        assert estimate.message == (
+            'outside the training: slides of felt are as quiet as the sensor at rest; slide faster, press harder, or '
+            'use a finer sensor, and train so'
+        )
     assert predict(quiet, vectors(examples, 'wood'))[-1].accepted
 
 

@@ -78,7 +78,8 @@ def augmented(examples, response, copies=2, shift=0.0):
     nothing = FeatureCopies(values[:0].astype(np.float32), groups[:0], numbers[:0], groups[:0])
     kinds = np.zeros(len(groups), dtype='<U1')
     made = FeatureCopies(values.astype(np.float32), groups, numbers, kinds)
-    return dataclasses.replace(examples, augmented=AugmentedFeatures(made, nothing, response))
+    responses = dict.fromkeys(examples.groups.tolist(), response)
+    return dataclasses.replace(examples, augmented=AugmentedFeatures(made, nothing, responses))
 
 
 def test_a_classifier_trained_with_gains_recognises_what_is_amplified(make_examples):

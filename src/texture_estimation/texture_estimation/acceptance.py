@@ -346,9 +346,9 @@ class Acceptance:
         rate, needed = self.rates.max_error_rate, slides_needed(self.rates.max_error_rate)
         if self.slides >= needed:
             return ''
-        allowed = f'at most {100.0 * rate:g} % wrong decisions'
         if math.isinf(needed):
-            return f'no early stopping: {allowed} cannot be shown'
+            return 'no early stopping: the recipe allows no wrong early decision (max_error_rate: 0)'
+        allowed = f'at most {100.0 * rate:g} % wrong decisions'
         return f'too few slides for early stopping: {allowed} need {needed:g} slides held out of the training'
 
     @cached_property

@@ -12,7 +12,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from texture_core.errors import InvalidData
-from texture_features.feature_set import RunningConditions, SlideConditions
+from texture_features.correction import Correction
+from texture_features.feature_set import AGAIN, LOAD, POWER, SlideConditions
 from texture_features.windows import Interval
 
 # --------------------
@@ -54,12 +55,14 @@ def is_beyond(value: float, interval: Interval | None, margin: float) -> bool:
 SPEED_MARGIN, FORCE_MARGIN = 0.15, 0.3
 DIRECTION_MARGIN_RAD = 0.35
 LEVEL_MARGIN = 1.0
+COMPARED = ('/moments/signal_log_power/', LOAD)  # features of a power of which slides must lie in the trained range
 QUIET = math.sqrt(2.0)  # a slide whose level is less than this many times that at rest adds less power than noise has
 # Motions whose direction turns within a window: they cover all directions, and theirs is not compared.
 TURNING_MOTIONS = ('circular',)
 REPLAYS = 'file/'  # a sensor that replays a file is named after the file, not after what measured
 OUTSIDE = 'outside the training'
 UNFELT = 'a finger that feels nothing shows the same'
+LOUDER = 'slide faster, press harder, or use a finer sensor, and train so'
 ONE_PLACE = 'trained at one place of each surface: elsewhere it may be rejected'
 
 
@@ -81,8 +84,8 @@ class Domain:
     slides: Mapping[str, int] = field(default_factory=dict)
     speed_margin: float = SPEED_MARGIN
     force_margin: float = FORCE_MARGIN
-    rest: Mapping[str, float] = field(default_factory=dict)  # median level of each channel before the touch
-    quiet_labels: tuple[str, ...] = ()  # labels of which each slide is as quiet as the sensor at rest
+    rest: Mapping[str, float] = field(default_factory=dict)  # by feature of a power, median level before the touch
+    quiet_labels: tuple[str, ...] = ()  # of which each slide is as quiet as the sensor at rest
     places: int = 0  # or sessions, of the label that has most; 0 if unknown
 
     def __post_init__(self) -> None:
@@ -97,12 +100,13 @@ class Domain:
     def of_slides(cls, conditions: Iterable[SlideConditions], labels: Iterable[str]) -> Domain:
         """Return the domain of a model that is trained on slides, with the usual margins."""
         slides, labels = tuple(conditions), tuple(labels)
+        turning = any(slide.motion in TURNING_MOTIONS for slide in slides)  # such a motion has all directions
         return cls(
             motions=_names(slide.motion for slide in slides),
             sensors=_names(slide.sensor for slide in slides if not slide.sensor.startswith(REPLAYS)),
             speed_m_s=interval_of((slide.speed_m_s, *slide.speed_range_m_s) for slide in slides),
             force_n=interval_of((slide.force_n, *slide.force_range_n) for slide in slides),
-            directions_rad=_directions(slides),
+            directions_rad=() if turning else tuple(sorted({angle for one in slides for angle in one.directions_rad})),
             levels=_levels(slides),
             rest=_rest(slides),
             slides=dict(Counter(labels)),
@@ -131,7 +135,13 @@ class Domain:
             slides=dict(Counter(self.slides) + Counter(new.slides)),
         )
 
-    def deviation(self, conditions: SlideConditions | RunningConditions) -> str:
+    def corrected(self, correction: Correction) -> Domain:
+        """Return the domain for another finger, whose noise is amplified by its correction; the load is not."""
+        gains = {name: correction.noise_gain(POWER.split(name)[0].partition(AGAIN)[0]) for name in self.rest}
+        rest = {name: level if name.endswith(LOAD) else level * gains[name] for name, level in self.rest.items()}
+        return replace(self, rest=rest)
+
+    def deviation(self, conditions: SlideConditions) -> str:
         """Return how an exploration lies outside this domain, in one sentence; '' if it lies within."""
         found, speed, force = list[str](), conditions.speed_m_s, conditions.force_n
         if is_beyond(speed, self.speed_m_s, self.speed_margin):
@@ -150,28 +160,21 @@ class Domain:
                     nearest = math.degrees(away[min(away)])
                     found.append(f'direction {math.degrees(direction):.0f}°, trained {nearest:.0f}°')
                     break
-        for channel, rms, *_ in conditions.levels:
-            trained = self.levels.get(channel)
+        for name, rms, *_ in conditions.levels:
+            trained = self.levels.get(name)
             if is_beyond(rms, trained, LEVEL_MARGIN):
-                found.append(f'signal level {rms:.3g} of {channel}, trained {_range(trained)}')
+                found.append(f'signal level {rms:.3g} of {POWER.sub("", name)}, trained {_range(trained)}')
         if quiet := self.quiet(conditions):
             found.append(f'{quiet}: {UNFELT}')
         return f'{OUTSIDE}: {"; ".join(found)}' if found else ''
 
-    def quiet(self, conditions: SlideConditions | RunningConditions) -> str:
+    def quiet(self, conditions: SlideConditions) -> str:
         """Return that all channels of an exploration are as quiet as the sensor at rest; '' if not, or if unknown."""
-        levels = {channel: rms for channel, rms, *_ in conditions.levels}
+        levels = {name: level for name, level, *_ in conditions.levels}
         if not self.rest or any(levels.get(name, math.inf) >= QUIET * rest for name, rest in self.rest.items()):
             return ''
         name, rest = next(iter(self.rest.items()))
-        return f'as quiet as the sensor at rest, {name} {levels[name]:.3g}, at rest {rest:.3g}'
-
-
-def _directions(slides: Sequence[SlideConditions]) -> tuple[float, ...]:
-    """Return the directions of slides; none where a motion has all of them."""
-    if any(slide.motion in TURNING_MOTIONS for slide in slides):
-        return ()
-    return tuple(sorted({angle for slide in slides for angle in slide.directions_rad}))
+        return f'as quiet as the sensor at rest, {POWER.sub("", name)} {levels[name]:.3g}, at rest {rest:.3g}'
 
 
 def _places(slides: Sequence[SlideConditions], labels: Sequence[str]) -> int:
@@ -185,22 +188,20 @@ def _places(slides: Sequence[SlideConditions], labels: Sequence[str]) -> int:
 
 
 def _levels(slides: Sequence[SlideConditions]) -> dict[str, Interval]:
-    """Return the range of the signal level of each channel."""
-    by_channel: defaultdict[str, list[list[float]]] = defaultdict(list)
-    for slide in slides:
-        for channel, *means in slide.levels:
-            by_channel[channel].append(means)
-    found = {channel: interval_of(means) for channel, means in by_channel.items()}
-    return {channel: interval for channel, interval in found.items() if interval is not None}
+    """Return the range of each level that is compared."""
+    means: defaultdict[str, list[list[float]]] = defaultdict(list)
+    for name, *of_slide in (level for slide in slides for level in slide.levels):
+        if any(compared in name for compared in COMPARED):
+            means[name].append(of_slide)
+    return {name: interval for name, each in means.items() if (interval := interval_of(each))}
 
 
 def _rest(slides: Sequence[SlideConditions]) -> dict[str, float]:
-    """Return the median level of each channel before the touch, of the slides that show it."""
-    by_channel: defaultdict[str, list[float]] = defaultdict(list)
-    for slide in slides:
-        for channel, level in slide.rest:
-            by_channel[channel].append(level)
-    return {channel: float(np.median(levels)) for channel, levels in by_channel.items()}
+    """Return the median level of each feature of a power before the touch, of the slides that show it."""
+    levels: defaultdict[str, list[float]] = defaultdict(list)
+    for name, level in (level for slide in slides for level in slide.rest):
+        levels[name].append(level)
+    return {name: float(np.median(each)) for name, each in levels.items()}
 
 
 def _names(names: Iterable[str]) -> tuple[str, ...]:

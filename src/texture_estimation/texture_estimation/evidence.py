@@ -10,7 +10,7 @@ import numpy as np
 
 from texture_core.types import NANOSECONDS, Array, FeatureVector, Rejection, TextureEstimate
 from texture_estimation.acceptance import SlideDistance, margin_of
-from texture_estimation.domain import OUTSIDE
+from texture_estimation.domain import LOUDER, OUTSIDE
 from texture_estimation.evidence_rules import GroupedEvidence, followed
 from texture_estimation.learners.learner import trust
 from texture_estimation.model import INVERSE_TEMPERATURE, TextureModel
@@ -72,10 +72,8 @@ class EvidenceAccumulator:
         if vector.last:
             self._over = True
             if vector.skipped and not self._message:
-                windows = vector.skipped + self._windows
-                self._message = (
-                    f'{vector.skipped} of {windows} windows were left out, as samples were lost or not finite'
-                )
+                left_out = f'{vector.skipped} of {vector.skipped + self._windows} windows were left out'
+                self._message = f'{left_out}, as samples were lost or not finite'
         elif self.model is not None:
             self._predict(vector, self.model)
         return self._estimate(vector)
@@ -108,7 +106,7 @@ class EvidenceAccumulator:
             self._message = f"a window was left out: its feature '{bad}' is not finite"
             return
         self._conditions.update(vector)
-        self._deviation = model.active_acceptance.domain.deviation(self._conditions)
+        self._deviation = model.active_acceptance.domain.deviation(self._conditions.get())
         scores, compared = model.predict_and_compare(vector.values)
         self._windows += 1
         self._window_ns = round(vector.window_s * NANOSECONDS)
@@ -148,7 +146,7 @@ class EvidenceAccumulator:
         rejection, decided = acceptance.assess(margin, distance, self._effective_windows)
         deviation = self._deviation
         if not deviation and model.labels[best] in acceptance.domain.quiet_labels:
-            deviation = f'{OUTSIDE}: slides of {model.labels[best]} are as quiet as the sensor at rest'
+            deviation = f'{OUTSIDE}: slides of {model.labels[best]} are as quiet as the sensor at rest; {LOUDER}'
         if deviation:
             rejection = Rejection.OUTSIDE_TRAINING
         elif not single and rejection is Rejection.NONE:

@@ -443,7 +443,9 @@ class TextureModel(StoredModel):
         if not added:
             return self.acceptance
         if distance is not None:
-            means = [compared_start(self.compared(slide.values), self._overlap) for slide in added]
+            windows = self.recipe.feature_set.windows
+            overlap = min(windows.hop_s / windows.length_s, 1.0)
+            means = [compared_start(self.compared(slide.values), overlap) for slide in added]
             distance = distance.with_slides(np.stack(means), np.array([self.labels.index(x.label) for x in added]))
         domain = self.acceptance.domain.widened([one.conditions for one in added], [one.label for one in added])
         return replace(self.acceptance, distance=distance, domain=domain)
@@ -455,12 +457,6 @@ class TextureModel(StoredModel):
         label = self.labels[number]
         slides = sum(added.label == label for added in self.added_slides)
         return replace(self.active_acceptance, slides=slides, added=label)
-
-    @property
-    def _overlap(self) -> float:
-        """Distance of two windows of a slide over their length."""
-        windows = self.recipe.feature_set.windows
-        return min(windows.hop_s / windows.length_s, 1.0)
 
     @cached_property
     def _hidden_layer(self) -> Callable[[Array], Array] | None:
@@ -625,12 +621,15 @@ def load_model(path: str | Path) -> TextureModel:
         if correction is not None:
             recipe = replace(recipe, feature_set=replace(recipe.feature_set, correction=correction))
             common['feature_set'] += f'{CORRECTED}{correction.fingerprint}'
+        acceptance = part_of(Acceptance, tree.get('acceptance'), 'acceptance')
+        if correction is not None:
+            acceptance = replace(acceptance, domain=acceptance.domain.corrected(correction))
         model = TextureModel(
             **common,
             recipe=recipe,
             labels=part_of(tuple[str, ...], tree.get('labels'), 'labels'),
             tempering_exponent=part_of(float, tree.get('tempering_exponent'), 'tempering_exponent'),
-            acceptance=part_of(Acceptance, tree.get('acceptance'), 'acceptance'),
+            acceptance=acceptance,
             next_touch_model=part_of(NextTouchModel | None, tree.get('next_touch_model'), 'next_touch_model'),
             examples=part_of(TrainingExamples | None, tree.get('examples'), 'examples'),
         )

@@ -17,7 +17,7 @@ from scipy.optimize import minimize_scalar
 from texture_core.errors import InvalidData
 from texture_core.types import AnyArray, Array
 from texture_estimation.acceptance import Acceptance, HeldOutSlide
-from texture_estimation.domain import UNFELT, Domain
+from texture_estimation.domain import LOUDER, UNFELT, Domain
 from texture_estimation.evidence_rules import EvidenceRule, followed
 from texture_estimation.gaussians import ClassDistance, compared_start
 from texture_estimation.learners.learner import (
@@ -40,7 +40,7 @@ from texture_estimation.model import TextureModel, TrainingExamples
 from texture_estimation.next_motion import NextTouchModel
 from texture_estimation.recipe import Recipe
 from texture_features.augmentation import NOISE
-from texture_features.feature_set import LOAD, FeatureCopies, LabelledFeatures, SlideConditions
+from texture_features.feature_set import LEAST_AT_REST, LOAD, FeatureCopies, LabelledFeatures, SlideConditions
 
 # --------------------
 # Fit the learner of a recipe to labelled windows, with what else the recipe trains it on.
@@ -125,7 +125,7 @@ def _augmented_examples(
         codes=classes[copied],
         groups=copied,
         rows=np.repeat(np.arange(len(copied)), _times(runs, examples, recipe.training.start_weight)),
-        gain_response=examples.augmented.gain_response,
+        gain_response=examples.augmented.gain_response(names),
         slide_deviations=means - centres[classes],
         slides=np.arange(len(names)),
         augmentation=recipe.augmentation,
@@ -294,9 +294,10 @@ def _reference_copies(examples: LabelledFeatures, names: Any, classes: Codes, ga
         return []
     rng = np.random.default_rng(0)
     widest, copies = math.log(gain_range), examples.augmented.copies
+    response = examples.augmented.gain_response(names)
     quiet = (copies.copies < REFERENCE_COPIES) & (copies.kinds != NOISE)
     return [
-        replace(copy, shift=rng.uniform(-widest, widest) * examples.augmented.gain_response)
+        replace(copy, shift=rng.uniform(-widest, widest) * response)
         for copy in _copied_slides(copies.select(quiet), names, classes)
     ]
 
@@ -391,6 +392,10 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
     quiet = [(label, why) for label, made in zip(of_slides, conditions, strict=True) if (why := domain.quiet(made))]
     counts = Counter(label for label, _ in quiet)
     domain = replace(domain, quiet_labels=tuple(label for label in counts if counts[label] == domain.slides[label]))
+    silent = ', '.join(recipe.feature_set.unknown_levels)
+    unknown = (
+        f'no feature is the power of {silent}' if silent else f'no approach of {LEAST_AT_REST} samples was recorded'
+    )
     acceptance = Acceptance(0 if fitted.held_out is None else len(slides), recipe.training.rates, domain)
     if not acceptance.reason:
         followed_slides = Followed(bound, examples)
@@ -431,9 +436,12 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
             'calibration': calibrated.note,
             'held_out_window_accuracy': accuracy,
             'quiet': [
-                f"{counts[label]} of {domain.slides[label]} slides of '{label}' are {why}: {UNFELT}; they are rejected"
+                f"{counts[label]} of {domain.slides[label]} slides of '{label}' are {why}: {UNFELT}; rejected; "
+                + LOUDER
                 for label, why in dict(quiet).items()
-            ],
+            ]
+            if domain.rest
+            else [f'{unknown}: a finger that feels nothing cannot be told from a quiet surface'],
         },
         examples=TrainingExamples.of(examples.values, codes),
     )

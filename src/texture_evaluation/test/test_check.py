@@ -47,6 +47,7 @@ def louder(slide, factor):
 
 def test_a_finger_is_checked_corrected_and_found_as_trained_again(trained):
     model, slides = trained
+    [rest_in_training] = load_model(model).acceptance.domain.rest.values()
     store_reference(model, TOPICS, [slides[5], slides[0]], REQUEST)
     as_trained, sentence = check(model, slides[1])
     assert as_trained and ': signal gain ' in sentence
@@ -72,6 +73,7 @@ def test_a_finger_is_checked_corrected_and_found_as_trained_again(trained):
         dataset = SlideDataset((louder(slides[3], 2.0),)).features(feature_set)
         assert dataset.feature_set == corrected.feature_set
         assert set(corrected.decide(dataset.values)) == {'leather'}
+    assert [*corrected.acceptance.domain.rest.values()] == [rest_in_training]  # the noise may be as it was
     plain = SlideDataset((slides[3],)).features(FeatureSet.load('default'))
     assert plain.feature_set != corrected.feature_set
 

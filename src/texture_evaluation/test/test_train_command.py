@@ -13,14 +13,14 @@ from texture_core.config import refuse_inputs
 from texture_core.errors import InvalidParameter, ModelMismatch
 from texture_core.types import TactileSignal
 from texture_estimation.model import TextureModel, both_files, load_model
-from texture_estimation.recipe import Recipe
+from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.roughness import load_roughness_model
 from texture_estimation.training import train
 from texture_evaluation.charts import refuse_chart_format
 from texture_evaluation.commands.train import summary
 from texture_evaluation.evaluate import evaluate
 from texture_evaluation.evaluate import summary as report_summary
-from texture_evaluation.train import train_from_bags, train_grades_from_bags
+from texture_evaluation.train import train_from_bags, train_grades_from_bags, training_examples
 from texture_features.feature_set import LabelledFeatures, read_recipe
 from texture_recordings.bags import BagWriter, read_bag
 from texture_recordings.dataset import SlideDataset
@@ -48,6 +48,20 @@ def test_the_training_reports_when_its_slides_are_too_few_to_decide(model: Textu
     assert lines[0] == "recipe 'tiny' trained on 2 surfaces: cork, felt"
     assert lines[2] == model.acceptance.reason
     assert 'too little training: 6 slides could be held out' in lines[2]
+
+
+def test_where_a_finger_that_feels_nothing_is_not_recognised_training_and_card_name_it(
+    model: TextureModel, simulated: Path, tmp_path: Path
+) -> None:
+    sentence = 'a finger that feels nothing cannot be told from a quiet surface'
+    assert f'no feature is the power of signal: {sentence}' in summary(model, Path('model.npz'))
+    dataset = SlideDataset.from_bags([simulated], '1-2')
+    imported = SlideDataset(tuple(replace(slide, states=slide.sliding) for slide in dataset))
+    recipe = load_recipe('default')
+    for slides, named in ((dataset, False), (imported, True)):
+        train(recipe, training_examples(recipe, slides)).save(tmp_path / 'mine')
+        lines = summary(load_model(tmp_path / 'mine'), tmp_path / 'mine')
+        assert (f'no approach of 10 samples was recorded: {sentence}' in lines) is named
 
 
 @pytest.mark.parametrize(

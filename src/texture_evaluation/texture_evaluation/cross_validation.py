@@ -379,19 +379,15 @@ def compare(first: CrossValidation, second: CrossValidation) -> PairedComparison
     clusters = [first.clusters.get(name, name) for name in slides]
     right, windows = (np.stack([clustered(results, clusters) for results in both]) for both in (right, windows))
     alike = np.stack([clustered(_counted(results), clusters)[:, 0] for results in recognised])  # slides of each cluster
-    p_value = mcnemar(int((alike[0] > alike[1]).sum()), int((alike[1] > alike[0]).sum()))
+    # The exact two-sided McNemar (sign) test; 1 if the two never differ.
+    ahead, differing = int((alike[0] > alike[1]).sum()), int((alike[0] != alike[1]).sum())
+    p_value = float(binomtest(ahead, differing).pvalue) if differing else 1.0
     slide_difference, slide_interval = _difference(right)
     window_difference, window_interval = _difference(windows)
     return PairedComparison(
         first.recipe, second.recipe, len(slides), right.shape[1], only_first, only_second, p_value,
         slide_difference, slide_interval, window_difference, window_interval,
     )  # fmt: skip
-
-
-def mcnemar(only_first: int, only_second: int) -> float:
-    """Return the exact two-sided p value of the McNemar (sign) test, 1 if the two never differ."""
-    differing = only_first + only_second
-    return float(binomtest(only_first, differing).pvalue) if differing else 1.0
 
 
 def _counts(result: CrossValidation, slides: Sequence[str], *, of_windows: bool) -> Array:

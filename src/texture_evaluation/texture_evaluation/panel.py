@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -207,17 +206,16 @@ def protocol_violations(ratings: Ratings) -> list[str]:
     given = ratings.grades[counts]
     if (given != np.rint(given)).any():
         found.append(f'{int((given != np.rint(given)).sum())} grades are not whole; the votes count them rounded')
-    return [*found, *_uneven_raters(ratings)]
-
-
-def _uneven_raters(ratings: Ratings) -> Iterator[str]:
     low, high = (number * len(ratings.textures) / PAPERS_TEXTURES for number in TEXTURES_PER_GRADE)
     low, high = math.floor(low), math.ceil(high)
     for name, row in zip(ratings.raters, ratings.grades, strict=True):
         used = (np.rint(row)[:, None] == RATINGS_GRADES).sum(axis=0)
         if used.min() < low or used.max() > high:
             shown = ', '.join(f'{count} × {grade}' for grade, count in zip(RATINGS_GRADES, used, strict=True))
-            yield f'rater {name} did not spread the textures evenly: {shown}; {low} to {high} a grade are required'
+            found.append(
+                f'rater {name} did not spread the textures evenly: {shown}; {low} to {high} a grade are required'
+            )
+    return found
 
 
 def _or_none(value: float) -> float | None:

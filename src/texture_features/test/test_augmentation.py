@@ -62,11 +62,19 @@ def one_input(samples, vibration=True):
 
 def test_the_gain_response_of_a_log_power_is_two_and_that_of_a_shape_is_none() -> None:
     [vector] = FEATURES.extract_many(cut()[:1])
-    response = dict(zip(vector.names, augmented().gain_response, strict=True))
+    of_slides = augmented().gain_response(np.array(['cork/1', 'cork/2']))
+    response = dict(zip(vector.names, of_slides, strict=True))
     bands = [value for name, value in response.items() if 'mean_log_bands' in name]
     assert bands == pytest.approx([2.0] * 8, abs=1e-6)
     rhythm = [value for name, value in response.items() if 'power_autocorrelation' in name]
     assert rhythm == pytest.approx([0.0] * len(rhythm), abs=1e-6)
+
+
+def test_the_gain_response_is_that_of_the_slides_that_train_alone() -> None:
+    found = dataclasses.replace(
+        augmented(), gain_responses={'a': np.array([1.0]), 'tested': np.array([9.0]), 'b': np.array([2.0])}
+    )
+    assert found.gain_response(np.array(['b', 'a'])) == pytest.approx([1.5])
 
 
 def test_a_copy_at_twice_the_speed_has_twice_the_frequency() -> None:

@@ -91,6 +91,15 @@ def test_a_corrected_window_has_the_features_of_the_finger_of_the_training():
     assert corrected.feature_set.startswith(f'{expected.feature_set} corrected=')
 
 
+@pytest.mark.parametrize(
+    ('gain', 'amplified'), [(0.5, 2.0), (2.0, 1.0)]
+)  # the noise may not have changed with the gain
+def test_the_correction_of_a_less_sensitive_finger_amplifies_its_noise(gain, amplified):
+    correction = Correction.of({'signal': compare(found(slide(0)), found(gain * slide(1)))})
+    assert correction.noise_gain('signal') == pytest.approx(amplified, rel=0.05)
+    assert correction.noise_gain('other') == 1.0
+
+
 def test_slides_that_prove_nothing_are_refused_with_what_to_do():
     for samples, rest, message in (
         (slide(seconds=1.0), None, 'slide for 2 s or longer'),

@@ -212,5 +212,46 @@ def test_the_level_of_a_channel_is_the_geometric_mean_of_the_rms_of_its_windows(
         log_power = 2.0 * math.log(rms)
         running.update(window(names=names, values=np.array([7.0, log_power, log_power + 2.0 * math.log(10.0)])))
     first, second = running.get().levels
-    assert first == ('signal/a', pytest.approx(2.0), pytest.approx(1.0), pytest.approx(2.0))
-    assert second[:2] == ('signal/b', pytest.approx(20.0))
+    assert first == (names[1], pytest.approx(2.0), pytest.approx(1.0), pytest.approx(2.0))
+    assert second[:2] == (names[2], pytest.approx(20.0))
+
+
+def test_the_level_at_rest_is_what_the_features_of_a_power_show_there() -> None:
+    features = FeatureSet.from_mapping(
+        {
+            'windows': {'length_s': 1.0},
+            'inputs': {
+                'signal': {'features': ['hjorth', 'moments']},
+                'signal_static': {'features': [{'log_variance': {'floor': 0.1}}, 'log_difference_variance']},
+            },
+        }
+    )
+    fast = np.tile([[3.0], [-3.0]], (50, 1))
+    fast = np.concatenate([fast, 1000.0 * fast, fast, fast[:7]])  # a stretch in which the arm sets off, a rest of one
+    slow = np.stack([np.zeros(10), np.tile([2.0, -2.0], 5)], axis=1)
+    rest = {'signal': (fast, 100.0, ('a',)), 'signal_static': (slow, 10.0, ('still', 'b'))}
+    assert features.rest_levels(rest) == {
+        'signal/moments/signal_log_power/a': pytest.approx(3.0),
+        'signal_static/log_variance/still': pytest.approx(math.sqrt(0.1)),
+        'signal_static/log_variance/b': pytest.approx(math.sqrt(4.1)),
+    }
+    assert features.rest_levels({**rest, 'signal': (fast[:9], 100.0, ('a',))}) == {}  # too few samples
+
+
+@pytest.mark.parametrize(
+    ('inputs', 'unknown'),
+    [
+        ({'signal': ['moments'], 'signal_static': ['log_variance']}, []),
+        ({'signal': ['hjorth'], 'signal#2': ['moments'], 'signal_static': ['mean']}, ['signal_static']),
+        ({'signal': ['mean_statistics'], 'signal_static': ['load_level']}, ['signal']),
+        (
+            {'finger0/signal': ['mean'], 'signal_static': ['log_difference_variance']},
+            ['finger0/signal', 'signal_static'],
+        ),
+    ],
+)
+def test_topics_of_which_no_feature_is_the_power_are_named(inputs, unknown) -> None:
+    features = FeatureSet.from_mapping({'inputs': {topic: {'features': names} for topic, names in inputs.items()}})
+    assert features.unknown_levels == unknown
+    rest = {topic: (np.ones((20, 1)), 10.0, ('a',)) for topic in features.topics}
+    assert bool(features.rest_levels(rest)) is not bool(unknown)

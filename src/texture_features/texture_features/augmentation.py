@@ -241,7 +241,7 @@ class Augmenter:
         self._slides = 0
         self._copies: list[Copy] = []
         self._disturbed: list[Copy] = []
-        self._responses: list[Array] = []
+        self._responses: dict[str, Array] = {}
 
     def add(
         self,
@@ -261,7 +261,7 @@ class Augmenter:
         windows = [event for event in events if isinstance(event, CutWindow)]
         if not windows:
             return
-        self._responses.append(self._gain_response(windows[0]))
+        self._responses[name] = self._gain_response(windows[0])
         longest = 1.0 + self._augmentation.speed_range
         longer = self._longer(cut, longest)
         for copy in range(self._augmentation.copies if longer else 0):
@@ -277,8 +277,7 @@ class Augmenter:
         """Return the copies of all slides; None if there are none."""
         if not self._copies:
             return None
-        response: Array = np.mean(self._responses, axis=0)
-        return AugmentedFeatures(_gathered(self._copies), _gathered(self._disturbed), response)
+        return AugmentedFeatures(_gathered(self._copies), _gathered(self._disturbed), self._responses)
 
     def _longer(self, cut: Cut, times: float) -> list[CutWindow]:
         """Return longer windows, from which others can be cut at a higher speed."""

@@ -206,6 +206,10 @@ class Correction:
         """Identifies it among other corrections."""
         return hashlib.sha256(json.dumps(self.as_mapping(), sort_keys=True).encode()).hexdigest()[:8]
 
+    def noise_gain(self, topic: str) -> float:
+        """Return by how much the noise at rest may be amplified: a finger that is less sensitive has the same noise."""
+        return max(1.0, float(np.sqrt(np.mean(10.0 ** (-self.response_db.get(topic, np.zeros(1)) / 10.0)))))
+
     def as_mapping(self) -> dict[str, Any]:
         """Return it in the form of JSON."""
         return {

@@ -263,6 +263,49 @@ class FeatureSet:
         """What is subscribed to, in order, each once."""
         return tuple(dict.fromkeys(map(topic_of, self.window_names)))
 
+    @property
+    def unknown_levels(self) -> list[str]:
+        """Topics of which no feature is the log power: whether they show a touch is unknown."""
+        known = {
+            item.topics[0]
+            for item in self.inputs
+            for name, feature in item.features
+            if any(POWER.search(f'/{name}/{value}') for value in feature.names)
+        }
+        return [topic for topic in self.topics if topic not in known]
+
+    def rest_levels(self, rest: Mapping[str, tuple[Array, float, tuple[str, ...]]]) -> dict[str, float]:
+        """Return the level at rest by the name of each feature of a power.
+
+        It is the median of stretches as long as a window: over more of it a level that settles would count as noise.
+
+        Parameters
+        ----------
+        rest
+            By topic the samples before the touch, (n_samples, n_channels), their rate in Hz and the channels.
+
+        Returns
+        -------
+        dict
+            Nothing where a topic has too few samples, or no feature of a power.
+        """
+        found: dict[str, float] = {}
+        for item in () if self.unknown_levels else self.inputs:
+            samples, rate_hz, channels = rest[item.topics[0]]
+            if len(samples) < LEAST_AT_REST:
+                return {}
+            length = min(len(samples), max(1, round(self.windows.length_s * rate_hz)))
+            cut = samples[: len(samples) // length * length].reshape(-1, length, len(channels))
+            stretches: Array = cut[np.isfinite(cut).all(axis=(1, 2))]
+            if not len(stretches):
+                return {}
+            windows = WindowBatch(stretches, rate_hz, channels=channels)
+            for one in item.features:
+                if powers := _log_powers(list(_names(replace(item, features=(one,)), channels))):
+                    typical = np.median(one[1](windows).reshape(len(stretches), -1), axis=0)
+                    found |= {name: _rms(typical[place]) for name, place in powers}
+        return found
+
     def tare_faults(self, tared: Mapping[str, bool]) -> list[str]:
         """Return sentences on streams that are tared and should not be, or the other way round.
 
@@ -492,13 +535,15 @@ def _listed(inputs: dict[str, tuple[str, str]]) -> str:
 # How one exploration was made: motion, sensor, and the speed, force, directions and signal level of its windows.
 
 DIRECTION_DIGITS = 2  # so that a slide has few directions, however long it is
-# In the name of the feature that holds the level of a channel, 'signal/moments/signal_log_power/dynamic'.
-LOG_POWER = '/moments/signal_log_power/'
+# In the names of the features that are the logarithm of a power, of a channel as in
+# 'signal/moments/signal_log_power/dynamic', or of a whole array; a mean of logarithms would hide the touched taxels.
+POWER = re.compile(r'(?<!/mean_statistics)/(moments/signal_log_power|log_variance|load_level)(?=/|$)')
 LOAD = '/load_level'  # ends the name of the feature that holds the level of a whole array
+LEAST_AT_REST = 10  # samples before the touch that show a level
 
 
-# Of a channel, such as 'signal/dynamic', over a slide: geometric mean of the root mean square of its windows, in the
-# unit of the signal, and the lowest and highest of the means over the first windows, however many.
+# Of a feature of a power over a slide: geometric mean of the root mean square of its windows, in the unit of the
+# signal, and the lowest and highest of the means over the first windows, however many.
 SignalLevel = tuple[str, float, float, float]
 
 
@@ -514,7 +559,7 @@ class SlideConditions:
     speed_range_m_s: Interval = UNKNOWN
     force_range_n: Interval = UNKNOWN
     levels: tuple[SignalLevel, ...] = ()
-    rest: tuple[tuple[str, float], ...] = ()  # of each channel before the touch, its standard deviation
+    rest: tuple[tuple[str, float], ...] = ()  # of each feature of a power before the touch
     session: str = ''
     place: str = ''
 
@@ -527,7 +572,7 @@ class RunningConditions:
         self._speed = RunningMean()
         self._force = RunningMean()
         self.directions_rad: dict[float, None] = {}  # in the order in which they came
-        self._levels: list[tuple[str, int, RunningMean]] | None = None  # channel, place among the features, log power
+        self._powers: list[tuple[str, int, RunningMean]] | None = None  # of each log power its name, place and mean
 
     def update(self, vector: FeatureVector) -> None:
         """Take the conditions of one more window into account."""
@@ -537,37 +582,22 @@ class RunningConditions:
         self._force.update(vector.force_n)
         if math.isfinite(vector.direction_rad):
             self.directions_rad[round(vector.direction_rad, DIRECTION_DIGITS)] = None
-        if self._levels is None and vector.names:
-            self._levels = [(channel, place, RunningMean()) for channel, place in _log_powers(vector.names)]
-        for _, place, log_power in self._levels or ():
+        if self._powers is None and vector.names:
+            self._powers = [(name, place, RunningMean()) for name, place in _log_powers(vector.names)]
+        for _, place, log_power in self._powers or ():
             log_power.update(float(vector.values[place]))
-
-    @property
-    def speed_m_s(self) -> float:
-        """Mean speed so far; NaN if unknown."""
-        return self._speed.value
-
-    @property
-    def force_n(self) -> float:
-        """Mean force so far; NaN if unknown."""
-        return self._force.value
-
-    @property
-    def levels(self) -> Sequence[tuple[str, float]]:
-        """Channels and their levels so far."""
-        return [(channel, _rms(power.value)) for channel, _, power in self._levels or ()]
 
     def get(self) -> SlideConditions:
         """Return the conditions of the windows so far."""
         return SlideConditions(
             self.motion,
             self.sensor,
-            self.speed_m_s,
-            self.force_n,
+            self._speed.value,
+            self._force.value,
             tuple(self.directions_rad),
             self._speed.range,
             self._force.range,
-            tuple((name, _rms(power.value), *map(_rms, power.range)) for name, _, power in self._levels or ()),  # type: ignore[misc]
+            tuple((name, _rms(power.value), *map(_rms, power.range)) for name, _, power in self._powers or ()),  # type: ignore[misc]
         )
 
 
@@ -576,12 +606,8 @@ def _rms(log_power: float) -> float:
 
 
 def _log_powers(names: Sequence[str]) -> list[tuple[str, int]]:
-    """Return the channels or arrays whose logarithm of the power is a feature, and its place among the features."""
-    return [
-        (name.replace(LOG_POWER, '/').removesuffix(LOAD), place)
-        for place, name in enumerate(names)
-        if LOG_POWER in name or name.endswith(LOAD)
-    ]
+    """Return the features that are the logarithm of a power, and their places."""
+    return [(name, place) for place, name in enumerate(names) if POWER.search(name)]
 
 
 # --------------------
@@ -608,7 +634,13 @@ class AugmentedFeatures:
 
     copies: FeatureCopies
     disturbed: FeatureCopies
-    gain_response: Array
+    gain_responses: Mapping[str, Array]  # by slide
+
+    def gain_response(self, slides: NDArray[np.str_]) -> Array:
+        """Return the mean change of each feature with the logarithm of the gain, of these slides."""
+        used = set(slides.tolist())
+        response: Array = np.mean([one for slide, one in self.gain_responses.items() if slide in used], axis=0)
+        return response
 
 
 # --------------------

@@ -50,7 +50,6 @@ if TYPE_CHECKING:
 # Labelled slides with their signals: read once from bags, or given as arrays.
 
 HOPS = 4  # windows of the least distance overlap so often
-LEAST_AT_REST = 10  # samples before the touch that show a level
 GAP_NS = NANOSECONDS  # between two slides that are given as arrays
 # Speeds and forces that differ by less are one condition: an arm deviates from its request.
 SAME_RATIO, SAME_RAD = 1.05, 0.1
@@ -422,8 +421,12 @@ class SlideDataset:
         motions = {slide.name: slide.motion for slide in self.slides if slide.motion}
         conditions = dict(features.conditions)
         for slide in (one for one in self.slides if one.name in conditions):
-            made, rest = conditions[slide.name], _rest_levels(slide, feature_set)
-            conditions[slide.name] = replace(made, session=slide.session, place=slide.place, rest=rest)
+            before = {topic: (slide.at_rest(topic), slide.signals[topic][0]) for topic in feature_set.topics}
+            rest = feature_set.rest_levels(
+                {topic: (samples, one.sampling_rate_hz, one.channels) for topic, (samples, one) in before.items()}
+            )
+            made = replace(conditions[slide.name], session=slide.session, place=slide.place)
+            conditions[slide.name] = replace(made, rest=tuple(rest.items()))
         return replace(
             features,
             motions=motions,
@@ -522,26 +525,6 @@ def _described(slide: LabelledSlide, feature_set: FeatureSet, events: Sequence[W
     """Return the feature vectors of the windows of a slide under its name; not its end."""
     vectors = (vector for vector in feature_set.extract_many(events) if not vector.last)
     return [replace(vector, exploration_id=slide.name) for vector in vectors]
-
-
-def _rest_levels(slide: LabelledSlide, feature_set: FeatureSet) -> tuple[tuple[str, float], ...]:
-    """Return the level of each channel before the touch; () where too little of it was recorded.
-
-    It is the median of stretches as long as a window: over more of it a level that settles would count as noise.
-    """
-    found: dict[str, float] = {}
-    for topic in feature_set.topics:
-        rest, like = slide.at_rest(topic), slide.signals[topic][0]
-        length = min(len(rest), round(feature_set.windows.length_s * like.sampling_rate_hz))
-        if length < LEAST_AT_REST:
-            return ()
-        levels = rest[: len(rest) // length * length].reshape(-1, length, rest.shape[1]).std(axis=1)
-        levels = levels[np.isfinite(levels).all(axis=1)]
-        if not len(levels):
-            return ()
-        names = (f'{topic}/{channel}' for channel in like.channels)
-        found |= zip(names, np.median(levels, axis=0).tolist(), strict=True)
-    return tuple(found.items())
 
 
 def no_window(dataset: SlideDataset, feature_set: FeatureSet) -> InvalidData:

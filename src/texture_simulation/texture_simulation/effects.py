@@ -190,7 +190,8 @@ class UnevenMotion:
             missing = max(0, int(section.max()) + 4 - knots.shape[-1])
             drawn = [rng.standard_normal((2, *batch_shape, 1)) for _ in range(missing)]
             knots = np.concatenate([knots, *drawn], axis=-1)
-            weights = _spline_weights(at - section)
+            t = at - section  # fraction of the section between the middle ones of four values of a cubic B-spline
+            weights = (1 - t) ** 3 / 6, (3 * t**3 - 6 * t**2 + 4) / 6, (-3 * t**3 + 3 * t**2 + 3 * t + 1) / 6, t**3 / 6
             size_m = self.distance_m / SPLINE_SPREAD
             dx_m, dy_m = (
                 size_m * sum(w * np.take_along_axis(one, section + i, axis=-1) for i, w in enumerate(weights))
@@ -199,11 +200,6 @@ class UnevenMotion:
             return Trajectory(x_m + dx_m, y_m + dy_m, path.force_n)
 
         return displace
-
-
-def _spline_weights(t: Array) -> tuple[Array, ...]:
-    """Return the weights of four values in a cubic B-spline at a fraction of the section between the middle ones."""
-    return (1 - t) ** 3 / 6, (3 * t**3 - 6 * t**2 + 4) / 6, (-3 * t**3 + 3 * t**2 + 3 * t + 1) / 6, t**3 / 6
 
 
 # --------------------

@@ -107,7 +107,6 @@ def simulate_exploration(
     exploration_id: str,
     rng: np.random.Generator,
     direction_rad: float = 0.0,
-    radius_m: float = 0.0,
     finger: int = 0,
 ) -> tuple[list[ExplorationState], SimulatedRecording]:
     """Return the states and the signals, by topic, of one exploration: approach, contact, slide, lift, done.
@@ -125,9 +124,7 @@ def simulate_exploration(
     rng
         Decides where the sample is touched, the errors and the noise.
     direction_rad
-        Direction of travel, from +x towards +y; at the start, for a circle.
-    radius_m
-        Of a circle, travelled anticlockwise; 0 for a straight line.
+        Direction of travel, from +x towards +y.
     finger
         Which individual of the sensor: each has individual traits.
     exploration_id
@@ -143,9 +140,7 @@ def simulate_exploration(
     for effect in scene.effects_of('slide'):
         speed, force = effect.slide(speed, force, rng)
     travelled_m, pressed_n = _profile(float(speed[0]), float(force[0]), slide_s, kind)
-    path = trajectory_along(
-        travelled_m, pressed_n, SimulatedSlide(speed_m_s, force_n, slide_s, direction_rad, radius_m)
-    )
+    path = trajectory_along(travelled_m, pressed_n, SimulatedSlide(speed_m_s, force_n, slide_s, direction_rad))
     streams = kind.make(scene.of_finger(finger), scene.surface(surface), rng, finger=finger).streams(path)
     friction = scene.surface(surface).friction
     # What a wrist sensor without errors would measure; NaN of a surface whose friction is not defined.
@@ -156,9 +151,8 @@ def simulate_exploration(
         'direction_rad': direction_rad,
         'tangential_force_n': tangential_n,
     }
-    motion = 'circular' if radius_m else 'linear_slide'
-    begun = ExplorationState(start_ns, exploration_id, motion, Phase.APPROACH, 0.0, surface=surface)
-    return _states(begun, slide_s, radius_m, slide), {
+    begun = ExplorationState(start_ns, exploration_id, 'linear_slide', Phase.APPROACH, 0.0, surface=surface)
+    return _states(begun, slide_s, slide), {
         stream.topic: _batches(streams[stream.topic], stream, start_ns) for stream in kind.streams
     }
 
@@ -174,9 +168,7 @@ def _profile(speed_m_s: float, force_n: float, slide_s: float, kind: SensorKind)
     return np.cumsum(speed_m_s * moving) / kind.path_rate_hz, force_n * pressed
 
 
-def _states(
-    begun: ExplorationState, slide_s: float, radius_m: float, slide: Mapping[str, float]
-) -> list[ExplorationState]:
+def _states(begun: ExplorationState, slide_s: float, slide: Mapping[str, float]) -> list[ExplorationState]:
     """Return the state at each change of phase, and regularly while sliding with the speed and force of `slide`."""
     lift_s, end_s = SLIDE_FROM_S + slide_s, SLIDE_FROM_S + slide_s + LIFT_S
 
@@ -185,9 +177,7 @@ def _states(
         return replace(begun, stamp_ns=stamp_ns, phase=phase, progress=at_s / end_s, **more)
 
     def sliding(at_s: float) -> ExplorationState:
-        turned_rad = (at_s - SLIDE_FROM_S) * slide['speed_m_s'] / radius_m if radius_m else 0.0
-        now = {'steady_s': min(STATE_PERIOD_S, lift_s - at_s), 'direction_rad': slide['direction_rad'] + turned_rad}
-        return state(at_s, Phase.SLIDE, **{**slide, **now})
+        return state(at_s, Phase.SLIDE, **slide, steady_s=min(STATE_PERIOD_S, lift_s - at_s))
 
     return [
         state(0.0, Phase.APPROACH),

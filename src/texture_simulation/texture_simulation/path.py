@@ -37,16 +37,12 @@ class Filter:
         if not values.shape[-1]:
             return values
         if self._state is None:
-            self._state = self._beginning(values)
+            self._state = np.zeros((len(self._sections), *values.shape[:-1], 2))
+            if self._settled:
+                shape = (len(self._sections), *[1] * (values.ndim - 1), 2)
+                self._state = _steady(self._sections.tobytes()).reshape(shape) * values[..., :1]
         filtered, self._state = signal.sosfilt(self._sections, values, axis=-1, zi=self._state)
         return np.asarray(filtered, dtype=np.float64)
-
-    def _beginning(self, values: Array) -> Array:
-        if not self._settled:
-            return np.zeros((len(self._sections), *values.shape[:-1], 2))
-        steady = _steady(self._sections.tobytes())
-        shape = (len(self._sections), *[1] * (values.ndim - 1), 2)
-        return steady.reshape(shape) * values[..., :1]
 
 
 # --------------------

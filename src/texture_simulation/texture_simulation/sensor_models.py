@@ -193,12 +193,8 @@ class BioTacModel(SensorModel):
         """Return PAC, and the slow channels if wanted, in counts."""
         placed, pressed_n = self._pressed_n(path)
         pressure_pa = PA_PER_N * pressed_n  # in the fluid
-        fast = {'signal': self._fast.exact(self._pac(pressure_pa))}
+        fast = {'signal': self._fast.exact(PAC_BASELINE + self._band(pressure_pa)[..., PAC_POINTS, None] / PAC_PA)}
         return {**fast, 'signal_static': self._slow.exact(self._frames(placed, pressure_pa))} if slow else fast
-
-    def _pac(self, pressure_pa: Array) -> Samples:
-        """Return PAC, (..., n_samples, 1) counts."""
-        return PAC_BASELINE + self._band(pressure_pa)[..., PAC_POINTS, None] / PAC_PA
 
     def _frames(self, placed: Trajectory, pressure_pa: Array) -> Samples:
         """Return the slow channels at the start of each frame, (..., n_frames, n_slow_channels) counts."""

@@ -103,15 +103,14 @@ class SklearnPredictor:
         """Return log-probabilities, (..., n_labels) of (..., n_features)."""
         rows = ((X - self.mean) / self.scale).reshape(-1, len(self.mean))
         scores = np.full((len(rows), self.n_labels), np.log(FLOOR / self.n_labels))
-        scores[:, self.estimator.classes_] = self._scores(rows)
-        return log_softmax(scores / self.temperature).reshape(*X.shape[:-1], self.n_labels)
-
-    def _scores(self, rows: Array) -> Array:
         if hasattr(self.estimator, 'predict_proba'):
             probabilities = np.asarray(self.estimator.predict_proba(rows), dtype=np.float64)
-            return np.log((1.0 - FLOOR) * probabilities + FLOOR / self.n_labels)
-        decisions = np.asarray(self.estimator.decision_function(rows), dtype=np.float64)
-        return np.stack((-decisions, decisions), axis=-1) if decisions.ndim == 1 else decisions
+            found = np.log((1.0 - FLOOR) * probabilities + FLOOR / self.n_labels)
+        else:
+            decisions = np.asarray(self.estimator.decision_function(rows), dtype=np.float64)
+            found = np.stack((-decisions, decisions), axis=-1) if decisions.ndim == 1 else decisions
+        scores[:, self.estimator.classes_] = found
+        return log_softmax(scores / self.temperature).reshape(*X.shape[:-1], self.n_labels)
 
 
 def _trees(value: Any, depth: int) -> Iterator[Any]:

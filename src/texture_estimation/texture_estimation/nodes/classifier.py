@@ -28,7 +28,7 @@ from texture_core.ros import (
     run,
     to_msg,
 )
-from texture_core.types import FeatureVector, ModelInfo, TextureEstimate
+from texture_core.types import FeatureVector, ModelInfo, Rejection, TextureEstimate
 from texture_estimation.evidence import NO_MODEL, EvidenceAccumulator
 from texture_estimation.incremental import ChangeError, ChangeRefused, IncrementalClassifier
 from texture_estimation.model import TextureModel, load_model
@@ -53,6 +53,7 @@ class EstimatorNode(Node):
     no_model: ClassVar[str]
     activity: ClassVar[str]
     vectors_unused: ClassVar[str]  # status message when there are new faults
+    in_part: ClassVar[Mapping[str, Any]]  # fields by which an estimate of a part of an exploration is not used
 
     def __init__(self, name: str, **kwargs: Any) -> None:
         super().__init__(name, **kwargs)
@@ -107,8 +108,10 @@ class EstimatorNode(Node):
         self._processing_s = time.perf_counter() - began
         if estimate.message and not estimate.windows and self._evidence.model:
             self.get_logger().warning(estimate.message, throttle_duration_sec=NO_ESTIMATE_PERIOD_S)
-        said = '; '.join(filter(None, (IN_PART if self._in_part else '', estimate.message)))
-        self._publisher.publish(to_msg(replace(estimate, message=said, processing_s=self._processing_s)))
+        if self._in_part:
+            estimate = replace(estimate, message='; '.join(filter(None, (IN_PART, estimate.message))))
+            estimate = replace(estimate, **self.in_part) if estimate.windows else estimate
+        self._publisher.publish(to_msg(replace(estimate, processing_s=self._processing_s)))
         self._estimates += 1
 
     def _change(self, params: EstimatorParams) -> None:
@@ -148,6 +151,7 @@ class Classifier(EstimatorNode):
     no_model = NO_MODEL
     activity = 'classifying'
     vectors_unused = 'some feature vectors could not be used'
+    in_part: ClassVar = {'rejection': Rejection.TOO_LITTLE_EVIDENCE, 'decided': False, 'prediction_set': ()}
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('classifier', **kwargs)

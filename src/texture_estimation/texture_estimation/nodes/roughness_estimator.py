@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 from texture_msgs import msg
 
@@ -20,6 +20,7 @@ class RoughnessEstimator(EstimatorNode):
     no_model = NO_MODEL
     activity = 'grading'
     vectors_unused = 'some feature vectors could not be graded'
+    in_part: ClassVar = {'valid': False}
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('roughness_estimator', **kwargs)

@@ -76,10 +76,10 @@ def summary(model: TextureModel, out: Path) -> list[str]:
         *_unfit(model),
         *_uneven(slides),
         *training.get('tare', []),
-        *training.get('quiet', []),
         *filter(
             None, [model.acceptance.reason or model.acceptance.decided_reason, model.acceptance.domain.reach_reason]
         ),
+        *training.get('quiet', []),
         *([f'{kinds} kinds of slides over each, from which `texture identify` can choose'] if kinds else []),
         _saved_as(out),
     ]

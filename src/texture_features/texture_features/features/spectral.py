@@ -73,15 +73,6 @@ def overlapping(rows: Array, length: int, step: int) -> Array:
     )
 
 
-def quarter_densities(windows: WindowBatch, bands: int) -> Array:
-    """Return the densities of the segments of windows, a quarter of a segment apart; features share them."""
-    step = max(1, bands // 2)
-    return windows.shared(
-        ('densities', bands),
-        lambda: segment_densities(windows.centred_rows, windows.rate_hz, 2 * bands, step, bands),
-    )
-
-
 def mean_over_segments(densities: Array) -> Array:
     """Return the mean over the segments, (..., n_bins)."""
     return mean_weights(densities.shape[-2]) @ densities
@@ -299,7 +290,8 @@ class MeanLogBands(Feature):
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the mean of log(density + floor)."""
-        logs = quarter_densities(windows, self.bands) + FLOOR
+        step = max(1, self.bands // 2)  # a quarter of a segment
+        logs = segment_densities(windows.centred_rows, windows.rate_hz, 2 * self.bands, step, self.bands) + FLOOR
         return mean_over_segments(np.log(logs, out=logs))
 
 

@@ -65,7 +65,7 @@ class FeatureExtractor(Node):
         self.create_subscription(msg.ExplorationState, 'exploration', self._on_state, STATE_QOS)
         for topic in self._feature_set.topics:
             self.create_subscription(msg.TactileSignal, topic, partial(self._on_signal, topic), SENSOR_QOS)
-        self.create_timer(TIMEOUT_PERIOD_S, self._on_timeout_timer)
+        self.create_timer(TIMEOUT_PERIOD_S, lambda: self._publish(self._cutter.time_out(time.monotonic())))
         self._diagnostics = Diagnostics(self, self._report)
 
     def _on_signal(self, topic: str, message: msg.TactileSignal) -> None:
@@ -88,9 +88,6 @@ class FeatureExtractor(Node):
     def _count_invalid(self, error: TextureError) -> None:
         self._invalid += 1
         self.get_logger().warning(str(error), throttle_duration_sec=1.0)
-
-    def _on_timeout_timer(self) -> None:
-        self._publish(self._cutter.time_out(time.monotonic()))
 
     def _publish(self, events: list[WindowEvent]) -> None:
         for event in events:

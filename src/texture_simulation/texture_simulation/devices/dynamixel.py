@@ -313,7 +313,12 @@ class EmulatedDynamixelBus(EmulatedSerialRobot):
     def _execute(self, motor: int, instruction: int, params: bytes) -> bytes:
         if instruction == SYNC_READ:
             address, size = struct.unpack_from('<HH', params)
-            return self._sync_read(address, size, params[4:])
+            answers = b''
+            for asked in params[4:]:
+                if not self.motors.answers(asked):
+                    break  # each waits for the one before it
+                answers += self._status(asked, bytes(self.motors.tables[asked][address : address + size]))
+            return answers
         if instruction == SYNC_WRITE:
             address, size = struct.unpack_from('<HH', params)
             for at in range(4, len(params), size + 1):
@@ -341,14 +346,6 @@ class EmulatedDynamixelBus(EmulatedSerialRobot):
             self.motors.reboot(motor)
             return answer
         return self._status(motor, b'', UNDEFINED)
-
-    def _sync_read(self, address: int, size: int, ids: bytes) -> bytes:
-        answers = b''
-        for motor in ids:
-            if not self.motors.answers(motor):
-                break  # each waits for the one before it
-            answers += self._status(motor, bytes(self.motors.tables[motor][address : address + size]))
-        return answers
 
     def _status(self, motor: int, params: bytes, error: int = 0) -> bytes:
         error |= ALERT if self.motors.tables[motor][ERROR] else 0

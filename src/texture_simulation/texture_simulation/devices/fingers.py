@@ -60,33 +60,20 @@ def encode_replies(values: Values, absent: Sequence[int] = ()) -> Bytes:
     return replies.reshape(n_frames, n_slots * (2 + 2 * n_fingers))
 
 
-def reply_frame(sequence: int, time_us: int, values: Values, reply: bytes, version: int = VERSION) -> bytes:
-    """Return one reply on the wire; `values`, (n_slots, n_fingers), are what it holds."""
-    return framed(ord('B'), version, sequence, time_us, shape=values.shape, body=reply)
-
-
-def serials_frame(sequence: int, time_us: int, serials: Sequence[str]) -> bytes:
-    """Return the serial numbers on the wire."""
-    return framed(ord('S'), VERSION, sequence, time_us, shape=(1, len(serials)), body=','.join(serials).encode('ascii'))
-
-
 def framed(kind: int, version: int, sequence: int, time_us: int, *, shape: tuple[int, ...], body: bytes) -> bytes:
     """Return a frame of a serial line designed in this project; its number wraps at 16 bits, its time at 32.
 
     `shape` is rows and columns of what it holds.
     """
     content = struct.pack('<BBHIBB', kind, version, sequence % 2**16, time_us % 2**32, *shape) + body
-    return stuff(content + struct.pack('<H', binascii.crc_hqx(content, 0xFFFF))) + b'\x00'
-
-
-def stuff(content: bytes) -> bytes:
-    """Return content in COBS: no zero byte, a length before every run."""
+    content += struct.pack('<H', binascii.crc_hqx(content, 0xFFFF))
+    # In COBS: no zero byte, a length before every run.
     blocks = []
     for run in content.split(b'\x00'):
         full, rest = run[: len(run) // 254 * 254], run[len(run) // 254 * 254 :]
         blocks += [b'\xff' + full[i : i + 254] for i in range(0, len(full), 254)]
         blocks.append(bytes([len(rest) + 1]) + rest)
-    return b''.join(blocks)
+    return b''.join(blocks) + b'\x00'
 
 
 # --------------------
@@ -353,11 +340,13 @@ class EmulatedBioTac(EmulatedDevice):
     def _sent(self, values: Values, reply: bytes) -> bytes:
         """Return the bytes that one frame becomes."""
         time_us = round(self._frames * len(values) * SLOT_US)
-        data = reply_frame(self._frames, time_us, values, reply, WRONG_VERSION if self.wrong_firmware else VERSION)
+        version = WRONG_VERSION if self.wrong_firmware else VERSION
+        data = framed(ord('B'), version, self._frames, time_us, shape=values.shape, body=reply)
         serials_sent, turn = divmod(self._frames, FRAMES_PER_SERIALS)
         self._frames += 1
         sent = self.frame_faults.apply(data, self._rng)
-        return sent if turn else serials_frame(serials_sent, time_us, self._serials) + sent
+        serials, shape = ','.join(self._serials).encode('ascii'), (1, len(self._serials))
+        return sent if turn else framed(ord('S'), VERSION, serials_sent, time_us, shape=shape, body=serials) + sent
 
     def _disturb(self, replies: Bytes) -> Bytes:
         """Return replies with flipped bits."""
@@ -425,13 +414,9 @@ class EmulatedSampler(EmulatedDevice):
         stream, number = self.STREAMS[name], self._frames[name]
         self._frames[name] += 1
         time_us = round(number * stream.rows * MICROSECONDS / stream.rate_hz)
-        data = encode_samples(stream, number, time_us, counts, WRONG_VERSION if self.wrong_firmware else VERSION)
+        version, body = WRONG_VERSION if self.wrong_firmware else VERSION, counts.astype('<i2').tobytes()
+        data = framed(stream.kind, version, number, time_us, shape=counts.shape, body=body)
         return self.frame_faults.apply(data, self._rng)
-
-
-def encode_samples(stream: SampledStream, number: int, time_us: int, counts: Counts, version: int = VERSION) -> bytes:
-    """Return a frame on the wire; number and time wrap."""
-    return framed(stream.kind, version, number, time_us, shape=counts.shape, body=counts.astype('<i2').tobytes())
 
 
 class EmulatedDaq(EmulatedSampler):
@@ -491,7 +476,10 @@ class Tsf85Encoder:
         for finger, counts in self._by_finger(dynamic.T):
             at = STAMP_AT.stop + self._present.index(finger) * 17 + 1
             rows[:, at : at + 2] = counts.astype('>i2')[:, None].view(np.uint8)
-        images = [_image_packet(finger, taxels) for finger, taxels in self._by_finger(image.T)]
+        images = [
+            bytes([0x9A, 0x00, 0x58, 1 + 2 * len(taxels), 0x10 | finger << 2]) + taxels.astype('>u2').tobytes()
+            for finger, taxels in self._by_finger(image.T)
+        ]
         for number, row in enumerate(rows):
             if image_is_new and number == 0:
                 yield from images
@@ -504,10 +492,6 @@ class Tsf85Encoder:
     @property
     def _present(self) -> list[int]:
         return [finger for finger, plugged in enumerate(self._plugged) if plugged]
-
-
-def _image_packet(finger: int, taxels: NDArray[Any]) -> bytes:
-    return bytes([0x9A, 0x00, 0x58, 1 + 2 * len(taxels), 0x10 | finger << 2]) + taxels.astype('>u2').tobytes()
 
 
 # --------------------
