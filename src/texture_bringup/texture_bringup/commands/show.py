@@ -9,12 +9,10 @@ import grp
 import inspect
 import os
 import platform
-import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from types import ModuleType
 
 import yaml
 
@@ -39,21 +37,19 @@ def table(rows: Iterable[Row]) -> str:
 # List what can be chosen.
 
 
-def _catalogue(module: ModuleType) -> list[Row]:
-    """Return each name of a catalogue with the comment next to it in the source."""
-    return re.findall(r"^    '(\w+)': .*  # (.+)$", inspect.getsource(module), re.MULTILINE)
+def _sensors() -> Iterator[Row]:
+    from texture_drivers.catalogue import SENSORS
+    from texture_simulation.emulator import LIVE_SENSORS
+
+    for name, sensor in SENSORS.items():
+        yield name, sensor.about + ('' if name in LIVE_SENSORS else '; not on the emulator')
 
 
-def _sensors() -> Iterable[Row]:
-    from texture_drivers import catalogue
+def _arms() -> Iterator[Row]:
+    from texture_exploration.arms.catalogue import ARMS
 
-    return _catalogue(catalogue)
-
-
-def _arms() -> Iterable[Row]:
-    from texture_exploration.arms import catalogue
-
-    return _catalogue(catalogue)
+    for name, arm in ARMS.items():
+        yield name, inspect.cleandoc(arm.__doc__ or '').partition('\n')[0]
 
 
 def _motions() -> Iterator[Row]:
