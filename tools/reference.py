@@ -386,9 +386,9 @@ def catalogue(entries: Mapping[str, Any]) -> Callable[[Path], str]:
 
 def sensors() -> str:
     """Return a table of the sensors."""
-    rows = ['| name | what it is | on the emulator |', '|---|---|---|']
+    rows = ['| name | what it is | `texture launch emulator` |', '|---|---|---|']
     for name, sensor in SENSORS.items():
-        rows.append(f'| `{name}` | {sensor.about} | {"yes" if name in LIVE_SENSORS else "no"} |')
+        rows.append(f'| `{name}` | {sensor.about} | {"✓" if name in LIVE_SENSORS else "–"} |')
     return '\n'.join(rows) + '\n'
 
 

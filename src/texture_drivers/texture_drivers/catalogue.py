@@ -39,21 +39,18 @@ SENSORS: Mapping[str, SensorEntry] = {
     'tsf85': SensorEntry(Tsf85, 'Robotiq TSF-85: vibration and IMU at 1000 Hz, 28 taxels at 60 Hz'),
     'tsf85_pair': SensorEntry(partial(Tsf85, fingers=(0, 1)), 'both fingers of a TSF-85: topics finger0/signal, …'),
     'tsf85_3x4': SensorEntry(
-        partial(Tsf85, layout=TSF85S['tsf85_3x4']), 'prototype of the TSF-85: vibration at 1000 Hz, 12 taxels at 25 Hz'
+        partial(Tsf85, layout=TSF85S['tsf85_3x4']),
+        'TSF-85 prototype of the papers: vibration at 1000 Hz, 12 taxels at 25 Hz',
     ),
     'biotac': SensorEntry(BioTac, 'SynTouch BioTac: PAC at 2200 Hz, 19 electrodes, PDC, TAC and TDC at 100 Hz'),
     'biotac_sp': SensorEntry(
         partial(BioTac, layout=BIOTACS['biotac_sp']), 'BioTac SP: PAC at 2200 Hz, 24 electrodes at 81.5 Hz'
     ),
     'biotac_hand': SensorEntry(
-        partial(BioTac, fingers=(0, 1, 2)), 'three BioTacs of a board: topics finger0/signal, …'
+        partial(BioTac, fingers=(0, 1, 2)), 'three BioTacs on a board: topics finger0/signal, …'
     ),
-    'daq': SensorEntry(
-        daq, '4 PVDF films and 4 strain gauges at 2500 Hz (Jamali & Sammut 2010), or other ADC channels'
-    ),
-    'pvdf': SensorEntry(pvdf, 'PVDF film at 4096 Hz, force sensor at 64 Hz (Hu et al. 2014)'),
+    'daq': SensorEntry(daq, '4 PVDF films and 4 strain gauges at 2500 Hz, or other ADC channels'),
+    'pvdf': SensorEntry(pvdf, 'PVDF film at 4096 Hz, force sensor at 64 Hz'),
     'anyskin': SensorEntry(AnySkin, 'AnySkin or ReSkin: 5 magnetometers (15 channels) at 100 to 400 Hz'),
-    'sound_card': SensorEntry(
-        SoundCard, 'contact microphone or accelerometer: 1 to 8 channels at 16 kHz, or at 8 to 192'
-    ),
+    'sound_card': SensorEntry(SoundCard, 'contact microphone or accelerometer: 1 to 8 channels at 16 kHz (8 to 192)'),
 }
