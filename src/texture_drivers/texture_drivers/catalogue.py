@@ -19,15 +19,13 @@ from texture_drivers.sound_card import SoundCard
 from texture_drivers.tsf85 import LAYOUTS as TSF85S
 from texture_drivers.tsf85 import Tsf85
 
-# How a sensor is made: from its parameters and a clock, ns since the epoch of the stamps. Opens nothing yet.
-MakeSensor = Callable[[SensorParams, Callable[[], int]], Sensor]
-
 
 @dataclass(frozen=True)
 class SensorEntry:
     """A sensor of the suite. Pages and `texture list sensors` show its text: what it is, channels and rates."""
 
-    make: MakeSensor
+    # From its parameters and a clock, ns since the epoch of the stamps; opens nothing yet
+    make: Callable[[SensorParams, Callable[[], int]], Sensor]
     about: str
 
     def __call__(self, params: SensorParams, now_ns: Callable[[], int]) -> Sensor:

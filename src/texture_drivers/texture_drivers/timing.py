@@ -433,7 +433,8 @@ class RateMeter:
     """Count samples until their rate is known.
 
     A sample arrives late by a varying delay but never early, so the period is the slope of the line just below all
-    arrivals (see `StreamClock`).
+    arrivals (see `StreamClock`). Reads hold any number of samples, and missing ones are counted by the caller; where
+    messages may be lost unseen, see `PeriodMeter` of the adaptor: with three in ten lost this one is wrong by 30 %.
     """
 
     def __init__(self) -> None:
