@@ -94,14 +94,7 @@ def _plan(speed_m_s: float, force_n: float, slide_s: float, fingers: int = 1) ->
 
 SOURCES = {
     'twelve_textures': GoldenSlides(
-        (
-            'any-place',
-            'any-place-and-taxels',
-            'default',
-            'peaks-naive-bayes',
-            'any-speed',
-            'vibration-and-taxels',
-        ),
+        ('any-place', 'any-place-and-taxels', 'default', 'peaks-naive-bayes', 'any-speed', 'vibration-and-taxels'),
         ('glass', 'brushed_metal', 'ridge_1mm', 'ridge_3mm'),
         'twelve_textures',
         _plan(0.1, 2.0, 1.5),
@@ -156,14 +149,7 @@ SOURCES = {
         _plan(0.15, 2.0, 1.5),
     ),
     'biotac20': GoldenSlides(
-        (
-            'default',
-            'peaks-naive-bayes',
-            'vibration-and-taxels',
-            'taxels-any-day',
-            'kaboli-em',
-            'kaboli-svm',
-        ),
+        ('default', 'peaks-naive-bayes', 'vibration-and-taxels', 'taxels-any-day', 'kaboli-em', 'kaboli-svm'),
         ('material02', 'material05', 'material09', 'material14'),
         data_set='biotac20',
     ),

@@ -35,6 +35,7 @@ from texture_exploration.motions import MOTIONS
 from texture_features.feature_set import FEATURES
 from texture_papers.catalogue import DIGESTS
 from texture_simulation.effects import EFFECTS
+from texture_simulation.emulator import LIVE_SENSORS
 from texture_simulation.friction import FRICTIONS
 from texture_simulation.scene import load_scene
 from texture_simulation.surfaces import KINDS
@@ -383,17 +384,18 @@ def catalogue(entries: Mapping[str, Any]) -> Callable[[Path], str]:
     return lambda root: '\n'.join(rows(root)) + '\n'
 
 
-def sensors(root: Path) -> str:
-    """Return a table of the sensors, several of which are one class, from the comments of their catalogue."""
-    text = (root / 'src/texture_drivers/texture_drivers/catalogue.py').read_text(encoding='utf-8')
-    commented = dict(re.findall(r"^    '(\w+)': .*,  # (.+)$", text, re.MULTILINE))
-    missing = sorted(SENSORS.keys() - commented.keys())
-    if missing:
-        raise SystemExit(
-            f'{", ".join(missing)}: say what the sensor is in a comment behind its line of texture_drivers/catalogue.py'
-        )
-    rows = ['| name | what it is |', '|---|---|', *(f'| `{name}` | {commented[name]} |' for name in SENSORS)]
+def sensors() -> str:
+    """Return a table of the sensors."""
+    rows = ['| name | what it is | `texture launch emulator` |', '|---|---|---|']
+    for name, sensor in SENSORS.items():
+        rows.append(f'| `{name}` | {sensor.about} | {"✓" if name in LIVE_SENSORS else "–"} |')
     return '\n'.join(rows) + '\n'
+
+
+def with_sensors(page: str) -> str:
+    """Return the page of the sensors with their table as it is now."""
+    begin, _table, end = re.split(r'(?<=<!-- sensors -->\n)(.*?)(?=<!-- end -->)', page, flags=re.DOTALL)
+    return begin + sensors() + end
 
 
 def scenes(root: Path) -> str:
@@ -475,9 +477,8 @@ PAGES: Mapping[str, tuple[str, str, Callable[[Path], str]]] = {
     'catalogues': (
         'Catalogues',
         'All names that recipes, scenes, requests and parameters may use. Instead of a name write `module:Class` for '
-        'a custom one.',
+        'a custom one. [Sensors](../sensors.md) are on their page.',
         parts(
-            ('Sensors', 'Values of the parameter `sensor`.', sensors),
             ('Adaptors', 'Values of the parameter `mapping` of the node `adaptor`.', adaptors),
             ('Arms', 'Values of the parameter `arm`.', catalogue(ARMS)),
             (
@@ -541,6 +542,8 @@ def page(name: str, root: Path = ROOT) -> str:
 def made(root: Path = ROOT) -> Iterator[tuple[Path, str]]:
     """Yield every generated page of the repository and its text."""
     yield from ((FOLDER / f'{name}.md', page(name, root)) for name in PAGES)
+    page_of_sensors = root / 'docs' / 'sensors.md'
+    yield page_of_sensors, with_sensors(page_of_sensors.read_text(encoding='utf-8'))
     yield from ((path.parent / 'README.md', package_readme(path.parent)) for path in root.glob('src/*/package.xml'))
 
 

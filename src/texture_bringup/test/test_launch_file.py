@@ -18,8 +18,6 @@ from texture_bringup.launcher import (
 )
 from texture_core import cli
 from texture_core.errors import InvalidData, InvalidLaunch, InvalidParameter, UnknownName
-from texture_drivers.catalogue import SENSORS
-from texture_simulation.emulator import LIVE_SENSORS
 
 ROOT = Path(__file__).parents[3]
 
@@ -244,20 +242,6 @@ def shown(name, arguments):
 )
 def test_calls_are_expanded_innermost_first_and_all_else_stays(text, expanded) -> None:
     assert expand(text, shown) == expanded
-
-
-@pytest.mark.parametrize('file', ['emulator', 'tactile'])
-def test_the_launch_files_name_every_emulated_sensor(file) -> None:
-    text = (ROOT / f'src/texture_bringup/launch/{file}.launch.xml').read_text()
-    [described] = re.findall(r'<arg name="sensor" default="tsf85" description="(.*?)"', text)
-    missing = set(LIVE_SENSORS) - set(re.findall(r'\w+', described))
-    assert not missing, f'{sorted(missing)}: name it in the description of `sensor` in {file}.launch.xml'
-
-
-def test_the_page_of_sensors_names_every_sensor() -> None:
-    table = (ROOT / 'docs/sensors.md').read_text().split('## Connect')[0]
-    missing = set(SENSORS) - set(re.findall(r'`(\w+)`', table))
-    assert not missing, f'{sorted(missing)}: name it in the first table of docs/sensors.md'
 
 
 @pytest.mark.parametrize('file', ['tactile', 'ur'])

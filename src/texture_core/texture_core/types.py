@@ -179,22 +179,21 @@ def lost_samples(batches: Sequence[TactileSignal]) -> int:
     return sum(max(0, after.first_sample - before.next_sample) for before, after in pairwise(batches))
 
 
+COMMON = ('sensor', 'channels', 'units', 'sampling_rate_hz', 'frame_id')  # of batches that can be joined
+
+
 def join_batches(batches: Sequence[TactileSignal], anchors_ns: Iterable[int] = ()) -> list[TactileSignal]:
     """Return consecutive batches of one stream with those that continue one another joined: fewer and larger ones."""
     anchors = [next((n for n, batch in enumerate(batches) if batch.end_ns > time_ns), -1) for time_ns in anchors_ns]
     groups: list[list[TactileSignal]] = []
     for number, batch in enumerate(batches):
         last = groups[-1][-1] if groups else None
-        if last and number not in anchors and batch.first_sample == last.next_sample and _alike(batch, last):
+        alike = last and all(getattr(batch, name) == getattr(last, name) for name in COMMON)
+        if last and alike and number not in anchors and batch.first_sample == last.next_sample:
             groups[-1].append(batch)
         else:
             groups.append([batch])
     return [replace(group[0], samples=np.concatenate([batch.samples for batch in group])) for group in groups]
-
-
-def _alike(one: TactileSignal, other: TactileSignal) -> bool:
-    names = ('sensor', 'channels', 'units', 'sampling_rate_hz', 'frame_id')
-    return all(getattr(one, name) == getattr(other, name) for name in names)
 
 
 # --------------------

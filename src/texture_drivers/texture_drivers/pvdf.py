@@ -55,26 +55,11 @@ class PvdfSettings:
     def streams(self) -> list[FramedStream]:
         """Return what the device sends, as the line understands it."""
         return [
-            FramedStream(
-                topic=FILM_TOPIC,
-                kind=FILM_KIND,
-                sensor=FILM_SENSOR,
-                rate_hz=FILM_RATE_HZ,
-                channels=FILM_CHANNELS,
-                units=('pC',),
-                gains=np.array([self.film_gain_pc]),
-                offsets=np.zeros(1),
-            ),
-            FramedStream(
-                topic=FORCE_TOPIC,
-                kind=FORCE_KIND,
-                sensor=FORCE_SENSOR,
-                rate_hz=FORCE_RATE_HZ,
-                channels=FORCE_CHANNELS,
-                units=('N',),
-                gains=np.array([self.force_gain_n]),
-                offsets=np.zeros(1),
-            ),
+            FramedStream(topic, kind, sensor, rate_hz, channels, (unit,), np.array([gain]), np.zeros(1))
+            for topic, kind, sensor, rate_hz, channels, unit, gain in (
+                (FILM_TOPIC, FILM_KIND, FILM_SENSOR, FILM_RATE_HZ, FILM_CHANNELS, 'pC', self.film_gain_pc),
+                (FORCE_TOPIC, FORCE_KIND, FORCE_SENSOR, FORCE_RATE_HZ, FORCE_CHANNELS, 'N', self.force_gain_n),
+            )
         ]
 
 

@@ -233,13 +233,14 @@ def _difficulty(protocol: PaperProtocol, found: MethodResults, *, tuned: bool) -
 def figures_of(method: Method, outcome: MethodResult, *, by_condition: bool = False) -> dict[str, Any]:
     """Return the figures of one method as an experiment's JSON holds them."""
     paper = {name: getattr(method.paper, name) for name in ('learning', 'test', 'unclassified')}
+    sets = {name: {'test': wilson(right_of(outcome, of)).as_json()} for name, of in method.sets.items()}
     return {
         'paper': {name: value for name, value in paper.items() if value is not None},
         'learning': None if outcome.learning is None else round(outcome.learning, 4),
         'test': outcome.test.as_json(),
         'unclassified': round(outcome.unclassified, 4),
         **(_by_condition(outcome) if by_condition else {}),
-        **(_by_set(method, outcome) if method.sets else {}),
+        **({'sets': sets} if sets else {}),
         'train_s': round(outcome.train_s, 3),
         'surfaces': list(outcome.surfaces),
         'confusion_last_unclassified': np.round(outcome.confusion, 3).tolist(),
@@ -252,11 +253,6 @@ def _by_condition(outcome: MethodResult) -> dict[str, Any]:
     return {
         'conditions': {name: {'test': wilson(outcome.right(outcome.conditions == name)).as_json()} for name in names}
     }
-
-
-def _by_set(method: Method, outcome: MethodResult) -> dict[str, Any]:
-    """Return the fraction recognised of the slides over each set of surfaces."""
-    return {'sets': {name: {'test': wilson(right_of(outcome, of)).as_json()} for name, of in method.sets.items()}}
 
 
 def right_of(outcome: MethodResult, surfaces: Sequence[str]) -> Array:

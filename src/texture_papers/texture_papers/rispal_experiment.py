@@ -73,15 +73,19 @@ class Answers:
         given = np.isfinite(self.grades)
         errors = np.abs(self.grades - self.true)
         within = errors <= NORMAL_90 * self.stds
+        # A texture is one opinion, however many windows it has; the spread is the mean over textures with a grade.
+        of_textures = self.error_by_texture()
+        means = list(of_textures.values())
+        stds = [row['std'] for row in self.by_texture().values() if math.isfinite(row['std'])]
         return {
             'error': float(errors[given].mean()) if given.any() else None,
-            'error_of_the_mean': self._error_of_the_mean(),
-            'std': self._spread(),
+            'error_of_the_mean': float(np.std(means, ddof=1) / np.sqrt(len(means))) if len(means) > 1 else None,
+            'std': float(np.mean(stds)) if stds else None,
             'without_grade': float(1.0 - given.mean()),
             # the paper writes 0 for no grade, and does not state whether it counts
             'error_none_as_0': float(np.where(given, errors, self.true).mean()),
             'coverage_90': float(within[given].mean()) if given.any() else None,
-            'by_texture': {name: round(error, 4) for name, error in self.error_by_texture().items()},
+            'by_texture': {name: round(error, 4) for name, error in of_textures.items()},
         }
 
     def by_texture(self) -> dict[str, dict[str, float]]:
@@ -96,16 +100,6 @@ class Answers:
                 'interval_std': float(self.stds[rows].mean()),
             }
         return table
-
-    def _error_of_the_mean(self) -> float | None:
-        """Return the standard error of the mean error, a texture being one opinion however many windows it has."""
-        means = list(self.error_by_texture().values())
-        return float(np.std(means, ddof=1) / np.sqrt(len(means))) if len(means) > 1 else None
-
-    def _spread(self) -> float | None:
-        """Return the standard deviation of the grades within a texture, the mean over the textures with a grade."""
-        stds = [row['std'] for row in self.by_texture().values() if math.isfinite(row['std'])]
-        return float(np.mean(stds)) if stds else None
 
     def error_by_texture(self) -> dict[str, float]:
         """Return the mean absolute error of each texture that got a grade."""
@@ -378,7 +372,8 @@ def checkless(recipe: RoughnessRecipe) -> RoughnessRecipe:
 def _leave_one_out(simulated: SimulatedTextures, recipe: RoughnessRecipe) -> Answers:
     """Return the grades of each texture by a model of all others; a quick run skips some of the paper's."""
     examples = simulated.extract(recipe.feature_set, simulated.textures, simulated.scans)
-    examples = _thinned(examples, simulated.scans_left_out)
+    first = [np.flatnonzero(examples.labels == name)[: simulated.scans_left_out] for name in simulated.textures]
+    examples = examples.take(np.concatenate(first))
     parts = []
     for texture in simulated.textures[:: QUICK_STEP if simulated.quick and recipe.name != OURS else 1]:
         held = examples.labels == texture
@@ -392,12 +387,6 @@ def _quickly(recipe: RoughnessRecipe, simulated: SimulatedTextures) -> Roughness
     if recipe.name == OURS and not simulated.quick:
         return recipe
     return replace(recipe, training=replace(recipe.training, folds=2))
-
-
-def _thinned(examples: LabelledFeatures, count: int) -> LabelledFeatures:
-    """Return the first `count` windows of each texture."""
-    kept = np.concatenate([np.flatnonzero(examples.labels == name)[:count] for name in dict.fromkeys(examples.labels)])
-    return examples.take(kept)
 
 
 def _grades(answers: Mapping[str, Mapping[str, Answers]]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,6 +33,17 @@ Feed = Callable[[Any, int, int], None]
 MakeDevice = Callable[[Path, np.random.Generator], EmulatedDevice]
 
 
+class Line(NamedTuple):
+    """What comes on the line of a device, and what its driver reports; nothing has a default."""
+
+    silent: str  # from the report of a device that opens and sends nothing
+    wrong: str  # from that of one with other firmware
+    numbered: bool  # packets have a number or a time
+    checked: bool  # frames have a checksum
+    restarts: bool  # after a brown-out the device sends again without a command
+    fault_rate: float  # of each kind of byte fault; more on a slow device: as many in the time of the test
+
+
 @dataclass(frozen=True)
 class RigCase:
     """A device, how it is fed, and how what arrives is to be read.
@@ -49,6 +60,7 @@ class RigCase:
     # Unit of each topic that must come: one for all of its channels, or one for each
     units: Mapping[str, str | tuple[str, ...]]
     modulus: int
+    line: Line | None  # None if the sensor differs from a listed one by a table alone
     config: str = ''  # Settings of the sensor, so that it publishes counts
     resting: str = ''  # Topic that the device is not fed with, if there is one
 
@@ -100,7 +112,7 @@ def feed_pvdf(device: Any, first: int, ticks: int) -> None:
     device.measure({'signal': film % 30_000, 'signal_static': film[film[:, 0, 0] % 64 == 0] // 64})
 
 
-def tsf85(prefix: str = '', taxels: int = 28, fingers: int = 1) -> RigCase:
+def tsf85(line: Line | None, prefix: str = '', taxels: int = 28, fingers: int = 1) -> RigCase:
     """Return how a TSF-85 is fed."""
     imu = ('m/s²',) * 3 + ('rad/s',) * 3
     units: dict[str, str | tuple[str, ...]] = {
@@ -110,30 +122,38 @@ def tsf85(prefix: str = '', taxels: int = 28, fingers: int = 1) -> RigCase:
     }
     feed = feed_tsf85(taxels, fingers)
     return RigCase(
-        EmulatedTsf85, f'{prefix}signal', 1000.0, 1, feed, units, 1000, resting=f'{prefix}signal_imu'
+        EmulatedTsf85, f'{prefix}signal', 1000.0, 1, feed, units, 1000, line, resting=f'{prefix}signal_imu'
     )  # fmt: skip
 
 
-def biotac(device: MakeDevice = EmulatedBioTac, prefix: str = '', slots: int = 44, fingers: int = 1) -> RigCase:
+def biotac(
+    line: Line | None, device: MakeDevice = EmulatedBioTac, prefix: str = '', slots: int = 44, fingers: int = 1
+) -> RigCase:
     """Return how a BioTac is fed."""
     units: dict[str, str | tuple[str, ...]] = {f'{prefix}signal': 'count', f'{prefix}signal_static': 'count'}
-    return RigCase(device, f'{prefix}signal', 4400 / slots, slots // 2, feed_biotac(slots, fingers), units, 4096)
+    return RigCase(device, f'{prefix}signal', 4400 / slots, slots // 2, feed_biotac(slots, fingers), units, 4096, line)
 
 
+VERSION_99 = 'sends frames of version 99, and 1 is known'
+FRAMES = Line('sends nothing;', VERSION_99, numbered=True, checked=True, restarts=True, fault_rate=4e-4)
 CASES: Mapping[str, RigCase] = {
-    'tsf85': tsf85(),
-    'tsf85_pair': tsf85('finger1/', fingers=2),
-    'tsf85_3x4': tsf85(taxels=12),
-    'biotac': biotac(),
-    'biotac_sp': biotac(slots=54),
-    'biotac_hand': biotac(partial(EmulatedBioTac, serials=('BT-0', 'BT-1', 'BT-2')), 'finger2/', fingers=3),
-    'daq': RigCase(EmulatedDaq, 'signal', 2500.0, 1, feed_signal(8), {'signal': 'count'}, 30_000, config=DAQ),
+    'tsf85': tsf85(
+        Line('sends nothing, started', 'no known packet', numbered=True, checked=False, restarts=False, fault_rate=4e-4)
+    ),
+    'tsf85_pair': tsf85(None, 'finger1/', fingers=2),
+    'tsf85_3x4': tsf85(None, taxels=12),
+    'biotac': biotac(FRAMES._replace(silent='sends no complete frames')),
+    'biotac_sp': biotac(None, slots=54),
+    'biotac_hand': biotac(None, partial(EmulatedBioTac, serials=('BT-0', 'BT-1', 'BT-2')), 'finger2/', fingers=3),
+    'daq': RigCase(EmulatedDaq, 'signal', 2500.0, 1, feed_signal(8), {'signal': 'count'}, 30_000, FRAMES, DAQ),
     'pvdf': RigCase(
-        EmulatedPvdf, 'signal', 4096.0, 1, feed_pvdf, {'signal': 'pC', 'signal_static': 'N'}, 30_000,
+        EmulatedPvdf, 'signal', 4096.0, 1, feed_pvdf, {'signal': 'pC', 'signal_static': 'N'}, 30_000, FRAMES,
         config='{film_gain_pc: 1.0, force_gain_n: 1.0}',
     ),
     'anyskin': RigCase(
-        EmulatedAnySkin, 'signal', 250.0, 1, feed_signal(15), {'signal': 'µT'}, 30_000, config='{rate_hz: 250.0}'
+        EmulatedAnySkin, 'signal', 250.0, 1, feed_signal(15), {'signal': 'µT'}, 30_000,
+        Line('sends nothing;', 'no valid frame', numbered=False, checked=False, restarts=True, fault_rate=2e-3),
+        config='{rate_hz: 250.0}',
     ),
 }  # fmt: skip
 

@@ -48,7 +48,7 @@ def board(
     return open_rig(
         'biotac',
         lambda link: BioTac(SensorParams(device=str(link), finger=finger), **options),
-        **vars(biotac(partial(EmulatedBioTac, serials=serials), prefix, fingers=len(serials))),
+        **vars(biotac(None, partial(EmulatedBioTac, serials=serials), prefix, fingers=len(serials))),
     )
 
 

@@ -88,28 +88,23 @@ class LiveSensor:
 MakeLiveSensor = Callable[[Scene, Surface, Path, np.random.Generator], LiveSensor]
 
 
-def _live(
-    kind: models.SensorKind, device: Callable[[Path, np.random.Generator], devices.EmulatedDevice], fingers: int = 1
-) -> MakeLiveSensor:
-    """Return what makes a sensor of a kind with some fingers on a device."""
+def _live(kind: models.SensorKind, fingers: int = 1) -> MakeLiveSensor:
+    """Return what makes a sensor of a kind with some fingers on its device."""
 
     def make(scene: Scene, surface: Surface, link: Path, rng: np.random.Generator) -> LiveSensor:
         made = [kind.make(scene.of_finger(finger), surface, rng, finger=finger) for finger in range(fingers)]
-        return LiveSensor(made, device(link, rng), kind)
+        return LiveSensor(made, kind.device(link, rng), kind)
 
     return make
 
 
 SERIALS = ('BT-0', 'BT-1', 'BT-2')  # of the BioTacs of a hand, by socket
 LIVE_SENSORS: Mapping[str, MakeLiveSensor] = {
-    'tsf85': _live(models.SENSORS['tsf85'], devices.EmulatedTsf85),
-    'tsf85_pair': _live(models.SENSORS['tsf85'], devices.EmulatedTsf85, 2),
-    'tsf85_3x4': _live(models.SENSORS['tsf85_3x4'], devices.EmulatedTsf85),
-    'biotac': _live(models.SENSORS['biotac'], devices.EmulatedBioTac),
-    'biotac_hand': _live(models.SENSORS['biotac'], partial(devices.EmulatedBioTac, serials=SERIALS), len(SERIALS)),
-    'daq': _live(models.SENSORS['daq'], devices.EmulatedDaq),
-    'pvdf': _live(models.SENSORS['pvdf'], devices.EmulatedPvdf),
-    'anyskin': _live(models.SENSORS['anyskin'], devices.EmulatedAnySkin),
+    **{name: _live(kind) for name, kind in models.SENSORS.items()},
+    'tsf85_pair': _live(models.SENSORS['tsf85'], 2),
+    'biotac_hand': _live(
+        models.SENSORS['biotac']._replace(device=partial(devices.EmulatedBioTac, serials=SERIALS)), len(SERIALS)
+    ),
 }
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from functools import lru_cache, partial
+from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from texture_drivers.biotac import LAYOUTS as BIOTACS
 from texture_drivers.tsf85 import LAYOUTS as TSF85S
 from texture_drivers.tsf85 import RATE_HZ, TSF85, Tsf85Layout
 from texture_simulation.contact import SkinContact
+from texture_simulation.devices import fingers as devices
 from texture_simulation.effects import BatchShape
 from texture_simulation.path import Filter, Trajectory, before_first
 from texture_simulation.scene import Scene
@@ -118,9 +120,10 @@ class SimulatedStream(NamedTuple):
 
 
 class SensorKind(NamedTuple):
-    """A simulated sensor."""
+    """A simulated sensor, and the emulated device through which it sends live."""
 
     make: Callable[..., SensorModel]
+    device: Callable[[Path, np.random.Generator], devices.EmulatedDevice]
     path_rate_hz: float
     step_points: int
     streams: tuple[SimulatedStream, ...]
@@ -233,6 +236,7 @@ def biotac_kind(layout: BioTacLayout) -> SensorKind:
     """Return a kind of BioTac."""
     return SensorKind(
         make=partial(BioTacModel, layout=layout),
+        device=devices.EmulatedBioTac,
         path_rate_hz=BIOTAC_PATH_RATE_HZ,
         step_points=len(layout.slots),
         streams=(
@@ -303,6 +307,7 @@ def _elements(finger: int) -> tuple[tuple[Array, Array], Array]:
 
 DAQ_KIND = SensorKind(
     make=DaqModel,
+    device=devices.EmulatedDaq,
     path_rate_hz=DAQ_PATH_RATE_HZ,
     step_points=1,
     streams=(SimulatedStream(daq.TOPIC, daq.SENSOR, DAQ_CHANNELS, 'V', DAQ_RATE_HZ),),
@@ -380,6 +385,7 @@ class AnySkinModel(SensorModel):
 
 ANYSKIN_KIND = SensorKind(
     make=AnySkinModel,
+    device=devices.EmulatedAnySkin,
     path_rate_hz=ANYSKIN_PATH_RATE_HZ,
     step_points=ANYSKIN_OVERSAMPLING,
     streams=(
@@ -445,6 +451,7 @@ class PvdfModel(SensorModel):
 
 PVDF_KIND = SensorKind(
     make=PvdfModel,
+    device=devices.EmulatedPvdf,
     path_rate_hz=PVDF_PATH_RATE_HZ,
     step_points=1,
     streams=(
@@ -538,6 +545,7 @@ def tsf85_kind(layout: Tsf85Layout) -> SensorKind:
     """Return a kind of TSF-85."""
     return SensorKind(
         make=partial(Tsf85Model, layout=layout),
+        device=devices.EmulatedTsf85,
         path_rate_hz=TSF85_PATH_RATE_HZ,
         step_points=TSF85_OVERSAMPLING,
         streams=(

@@ -9,11 +9,8 @@ import grp
 import inspect
 import os
 import platform
-import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from functools import partial
-from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -40,9 +37,19 @@ def table(rows: Iterable[Row]) -> str:
 # List what can be chosen.
 
 
-def _catalogue(module: str) -> list[Row]:
-    """Return each name of a catalogue with the comment next to it in the source."""
-    return re.findall(r"^    '(\w+)': .*  # (.+)$", inspect.getsource(import_module(module)), re.MULTILINE)
+def _sensors() -> Iterator[Row]:
+    from texture_drivers.catalogue import SENSORS
+    from texture_simulation.emulator import LIVE_SENSORS
+
+    for name, sensor in SENSORS.items():
+        yield name, sensor.about + ('' if name in LIVE_SENSORS else '; not on the emulator')
+
+
+def _arms() -> Iterator[Row]:
+    from texture_exploration.arms.catalogue import ARMS
+
+    for name, arm in ARMS.items():
+        yield name, inspect.cleandoc(arm.__doc__ or '').partition('\n')[0]
 
 
 def _motions() -> Iterator[Row]:
@@ -76,9 +83,9 @@ def _surfaces() -> Iterator[Row]:
 
 
 LISTS: Mapping[str, tuple[str, Callable[[], Iterable[Row]]]] = {
-    'sensors': ('what `sensor:=` of a launch takes', partial(_catalogue, 'texture_drivers.catalogue')),
+    'sensors': ('what `sensor:=` of a launch takes', _sensors),
     'motions': ('what `texture explore` takes, with default and range of each number', _motions),
-    'arms': ('what `arm` of the explorer takes', partial(_catalogue, 'texture_exploration.arms.catalogue')),
+    'arms': ('what the parameter `arm` of the explorer takes', _arms),
     'recipes': ('what `texture train` takes', _recipes),
     'surfaces': ('what the emulator simulates, by scene', _surfaces),
 }

@@ -63,7 +63,7 @@ class HandState(NamedTuple):
 
 
 class InHandArm(Arm):
-    """A Dynamixel hand: some fingers hold once connected, the others slide; see `texture_exploration.arms.arm.Arm`.
+    """A Dynamixel hand: some fingers hold once connected, the others slide.
 
     The state is the mean of the sliding fingers. A holding finger that presses with less than half of the wanted force
     is a fault.

@@ -79,7 +79,7 @@ BAUD = 230400  # of a UART; a USB device ignores it
 
 
 class RailsArm(Arm):
-    """Two rails and a pressing motor behind a microcontroller; see `texture_exploration.arms.arm.Arm`."""
+    """Two rails and a pressing motor behind a microcontroller (Hu et al. 2014)."""
 
     Params = RailsParams
 

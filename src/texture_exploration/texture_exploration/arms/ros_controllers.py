@@ -87,7 +87,7 @@ def open_topics(params: RosControllersParams) -> ControllerTopics:
 
 
 class RosControllersArm(SurfaceArm):
-    """An arm that ROS drives by a Cartesian velocity controller; see `texture_exploration.arms.arm.Arm`.
+    """An arm that ROS drives by a Cartesian velocity controller.
 
     Zero velocity is commanded at every end: a stop, a fault, a command that is too old, `close`, and by a guard
     process if this one is killed; and always until the pose shows rest. After a connection, and after each silence
