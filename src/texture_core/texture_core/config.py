@@ -389,7 +389,7 @@ def load_yaml(path: Path, what: str) -> Any:
     """Return the plain values in a YAML file; `what` is the noun for the error sentence, such as 'scene'."""
     try:
         return parse_yaml(read_text(path, 4 * MAX_CHARACTERS))
-    except yaml.MarkedYAMLError as error:
+    except (yaml.scanner.ScannerError, yaml.parser.ParserError) as error:
         mark = error.context_mark or error.problem_mark
         place = f'from line {mark.line + 1}, column {mark.column + 1} on, ' if mark else ''
         raise InvalidParameter(
