@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from foreign_tables import MAPPING
 
 from texture_bringup.launcher import read
 from texture_core import config as resources
@@ -97,7 +98,11 @@ READERS: dict[str, Reader] = {
     'preset': text_file('texture_papers', 'config/presets/ets-linear.yaml', load_preset),
     'settings': text_file('texture_drivers', 'config/sensors/daq.yaml', load_daq),
     'grades': text_file('texture_papers', 'config/grades/ets_roughness.csv', read_grades),
-    'mapping': text_file('texture_recordings', 'config/mappings/icub20.yaml', load_mapping),
+    'mapping': (
+        lambda folder: (folder / 'good.yaml').write_text(MAPPING),
+        lambda folder: load_mapping(folder / 'good.yaml'),
+        ('good.yaml',),
+    ),
     'launch file': text_file('texture_bringup', 'launch/emulator.launch.xml', lambda path: read(Path(path), {}, {})),
 }
 CASES = [(name, file) for name, (_, _, files) in READERS.items() for file in files]

@@ -177,6 +177,15 @@ def test_bad_yaml_is_refused_with_one_line_and_soon(what: str, tmp_path: Path) -
     assert '\n' not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ('text', 'place'), [("files: '{a}.csv\nlabel: b\n", 'line 1, column 8'), ('a:\n\tb: 3\n', 'line 2, column 1')]
+)
+def test_text_that_is_no_yaml_is_named_by_its_place_and_what_to_do(tmp_path: Path, text: str, place: str) -> None:
+    (tmp_path / 'file.yaml').write_text(text)
+    with pytest.raises(InvalidParameter, match=f'read: from {place} on, close quotes and brackets, write .*, not tabs'):
+        load_yaml(tmp_path / 'file.yaml', 'mapping')
+
+
 def test_a_key_that_is_there_twice_is_named_with_its_lines(tmp_path: Path) -> None:
     (tmp_path / 'file.yaml').write_text('label: {value: cork}\nfiles: a\nlabel: {column: b}\n')
     with pytest.raises(InvalidParameter, match="the key 'label' is in line 1 and again in line 3; write it once"):

@@ -345,7 +345,7 @@ class Arrays:
 # Check where a command is to write, before anything is computed.
 
 
-def refuse_inputs(outputs: Sequence[str | Path | None], inputs: Sequence[str | Path]) -> None:
+def check_outputs(outputs: Sequence[str | Path | None], inputs: Sequence[str | Path]) -> None:
     """Refuse to write over a file that is read, or into a folder that does not exist."""
     read = {_real(given) for given in inputs}
     for output in outputs:
@@ -389,6 +389,13 @@ def load_yaml(path: Path, what: str) -> Any:
     """Return the plain values in a YAML file; `what` is the noun for the error sentence, such as 'scene'."""
     try:
         return parse_yaml(read_text(path, 4 * MAX_CHARACTERS))
+    except (yaml.scanner.ScannerError, yaml.parser.ParserError) as error:
+        mark = error.context_mark or error.problem_mark
+        place = f'from line {mark.line + 1}, column {mark.column + 1} on, ' if mark else ''
+        raise InvalidParameter(
+            f"{what} '{path}' is not YAML that can be read: {place}close quotes and brackets, write ': ' behind a "
+            'name, and blanks, not tabs, before it'
+        ) from error
     except PARSE_ERRORS as error:
         raise InvalidParameter(f"{what} '{path}' is not YAML that can be read: {error}") from error
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from texture_core.errors import InvalidData
+from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.types import Phase
 from texture_features.segmentation import SegmentationParams
 from texture_recordings.bags import BagWriter, read_bag
@@ -54,3 +54,9 @@ def test_a_bag_without_vibration_gets_one_sentence(bag, tmp_path):
             writer.write(topic, value, log_ns)
     with pytest.raises(InvalidData, match='record the vibration'):
         segment_bags([bare], tmp_path / 'found', SegmentationParams())
+
+
+def test_nothing_is_written_into_a_folder_that_exists(bag, tmp_path):
+    (tmp_path / 'found').mkdir()
+    with pytest.raises(InvalidParameter, match="found' exists already; nothing is overwritten, name another folder"):
+        segment_bags([bag], tmp_path / 'found', SegmentationParams())

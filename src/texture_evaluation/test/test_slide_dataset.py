@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_core.errors import InvalidData
+from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.types import NANOSECONDS, ExplorationState, Phase, SlideMotion, TactileSignal
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.evaluate import evaluate
@@ -296,3 +296,13 @@ def test_slides_in_bags_report_how_they_were_made(tmp_path) -> None:
     examples = SlideDataset.from_bags(bags).features(load_recipe('default').feature_set)
     made = SlideMotion('linear_slide', 0.5, 0.05, 1.5, pytest.approx(0.6))
     assert examples.motions == {'glass/1': made, 'glass/2': made}
+
+
+def test_slides_of_two_kinds_are_refused_with_both_sensors() -> None:
+    pair = [
+        SlideDataset.from_arrays({'signal': arrays(channels=count)}, LABELS, {'signal': RATE_HZ}, sensor=name)
+        for count, name in ((2, 'finger/a'), (3, 'finger/b'))
+    ]
+    mixed = SlideDataset((pair[0][0], pair[1][1]))
+    with pytest.raises(ModelMismatch, match=r"has .* of the sensor 'finger/b', and those before it .* of 'finger/a'"):
+        mixed.features(FEATURES)

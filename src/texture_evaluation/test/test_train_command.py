@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_core.config import refuse_inputs
+from texture_core.config import check_outputs
 from texture_core.errors import InvalidParameter, ModelMismatch
 from texture_core.types import TactileSignal
 from texture_estimation.model import TextureModel, both_files, load_model
@@ -164,10 +164,10 @@ def test_files_that_are_read_are_not_overwritten_and_another_may_be(
     (tmp_path / 'sub').mkdir()
     for model in ('m1', 'm1.npz', 'm1.json'):
         with pytest.raises(InvalidParameter, match='would overwrite'):
-            refuse_inputs([output], [*both_files(model), 'own.yaml'])
+            check_outputs([output], [*both_files(model), 'own.yaml'])
     with pytest.raises(InvalidParameter, match='its folder does not exist'):
-        refuse_inputs(['nowhere/figures.json'], [])
-    refuse_inputs(['figures.json', None], [*both_files('m1'), 'own.yaml', tmp_path / 'bags'])
+        check_outputs(['nowhere/figures.json'], [])
+    check_outputs(['figures.json', None], [*both_files('m1'), 'own.yaml', tmp_path / 'bags'])
 
 
 def test_a_chart_is_a_png_svg_or_pdf_and_others_are_refused() -> None:

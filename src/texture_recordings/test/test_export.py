@@ -57,7 +57,7 @@ def test_every_stream_is_imported_again_with_the_same_samples_labels_and_conditi
 
 def test_a_condition_that_one_slide_lacks_and_labels_that_are_alike_come_back(tmp_path) -> None:
     forces, labels = [1.5, np.nan, 2.5], ['cork', 'Cork', 'nan']
-    signals = {'signal': [number + np.sin(np.arange(300.0))[:, None] for number in range(3)]}
+    signals = {'signal': [np.sin(number * np.arange(300.0))[:, None] for number in (1, 2, 3)]}
     given = SlideDataset.from_arrays(signals, labels, {'signal': 1000.0}, force_n=forces)
     export_slides(given, tmp_path / 'out')
     report = import_tables(load_mapping(tmp_path / 'out' / 'signal.yaml'), tmp_path / 'out', tmp_path / 'bags')

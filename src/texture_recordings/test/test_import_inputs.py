@@ -32,6 +32,7 @@ N = 600
 T = np.arange(N) / 100.0
 X = (np.sin(0.3 * np.arange(N)) + 0.001 * np.arange(N)).round(4)
 Y = np.cos(0.17 * np.arange(N)).round(4)
+U, V = np.random.default_rng(1).normal(size=(2, N)).round(4)
 PLAIN = {
     'files': '{material}_{run}.csv', 'streams': {'signal': {'columns': ['x'], 'time': {'column': 't'}}},
     'label': {'column': 'material'},
@@ -102,15 +103,10 @@ OVERLAP = np.r_[T[:300], 2.7 + T[:300]].round(2)
 PAUSE = {'slides': {'by': 'pause', 'min_s': 0.05}}
 BACK = r"row \d+, column 't': time goes back .*by: pause"
 CLOCKS: dict[str, tuple[Write, dict, Truth]] = {
-    'bursts that lost rows': (
-        csv(bursts(3)[~LOST], X[~LOST]), {}, 'in bursts of 1 to 3, .*so lost rows cannot be told; .* the rate is 99',
-    ),
-    'bursts of a buffer that is read at any time': (csv(UNEVEN, X), {}, 'in bursts of 2 to 3, .*so lost rows cannot'),
-    'bursts in disorder': (
-        csv(bursts(3)[np.r_[0:100, 101, 100, 102:N]], X), {}, '2 of 600 rows, which come in bursts, are out of order',
-    ),
+    'a buffer that is read at any time': (csv(UNEVEN, X), {}, '350 times come twice: .* a buffer that is stamped when'),
     'ms at 1000 Hz': (
-        csv((T[~LOST] / 10).round(3), X[~LOST]), {}, 'counts in steps of 0.001 s at 1000 Hz, so lost samples cannot be',
+        csv((T[~LOST] / 10).round(3), X[~LOST]), {},
+        'row 101, .*a gap of 0.003 s follows: samples were lost there, or time, which counts in .* 1000 Hz, was round',
     ),
     'ms at 1000 Hz that are stated': (
         csv((T[~LOST] / 10).round(3), X[~LOST]), timed(rate_hz=1000.0), [('cork', HOLED)],
@@ -120,17 +116,19 @@ CLOCKS: dict[str, tuple[Write, dict, Truth]] = {
         [('cork', np.insert(X, 300, [np.nan] * 7))],
     ),
     'a counter of 16 bits in ms': (csv((6e4 * T).astype(int) % 2**16, X), timed('ms'), 'rate of .* is 1.667 Hz'),
-    'a counter of 16 bits in us': (
-        csv((1e6 * T).astype(int) % 2**16, X), timed('us'), 'rolls over every 0.0655 s, in which lost samples and a',
+    **{
+        f'a counter of {bits} bits in {unit}': (
+            csv((start + 1e-2 / factor * np.arange(N)).astype(int) % 2**bits, X), timed(unit),
+            'time goes back from .* the roll of a counter, or midnight, add its period|of time, where it may go back',
+        )
+        for bits, unit, factor, start in (
+            (16, 'us', 1e-6, 0), (24, 'us', 1e-6, 2**24 - 10**6), (31, 'ms', 1e-3, 2**31 - 5000),
+            (32, 'us', 1e-6, 2**32 - 10**6), (32, 'ns', 1e-9, 2**32 - 10**8),
+        )
+    },
+    'seconds of the minute by pause': (
+        csv((T + 57).round(2) % 60, X), PAUSE, [('cork', X[:300]), ('cork', X[300:])],
     ),
-    'a counter of 16 bits in us at 15 Hz': (
-        csv((1e6 * T / 0.15).astype(int) % 2**16, X), timed('us'), 'rolls over every 0.0655 s, in which lost samples',
-    ),
-    'seconds of the minute by pause': (csv((T + 57) % 60, X), PAUSE, 'every 60 s, in which a run that is'),
-    'a counter of 32 bits in us': (csv(((1e6 * T).astype(int) + 2**32 - 10**6) % 2**32, X), timed('us'), CORK),
-    'a counter of 31 bits in ms': (csv(((1e3 * T).astype(int) + 2**31 - 5000) % 2**31, X), timed('ms'), CORK),
-    'a counter of 32 bits in ns': (csv(((1e9 * T).astype(int) + 2**32 - 10**8) % 2**32, X), timed('ns'), CORK),
-    'a counter of 24 bits in us': (csv((T * 1e6 + 3e6) % 2**24, X), timed('us'), CORK),
     'runs': (csv(np.r_[T[:100], T[:500]], X), {}, BACK),
     'a run of few rows': (csv(np.r_[T[:590], T[:10]], X), {}, BACK),
     'runs by pause': (csv(np.r_[T[:100], T[:500]], X), PAUSE, [('cork', X[:100]), ('cork', X[100:])]),
@@ -163,24 +161,19 @@ CLOCKS: dict[str, tuple[Write, dict, Truth]] = {
         'the rate changes within a slide: by 111.1 Hz this row is 17.5 samples off',
     ),
     'rate drifts': (csv(np.cumsum(np.linspace(0.008, 0.012, N)).round(6), X), {}, 'rate changes within a slide'),
-    'midnight': (csv(((T + 86_397) % 86_400).round(2), X), {}, CORK),
-    'times of 32 bits': (npz(t=(1e5 + T).astype(np.float32), x=X), ANY, 'time counts in steps of 0.0078125 s'),
+    'midnight': (csv(((T + 86_397) % 86_400).round(2), X), {}, 'lasts 8.64e.04 s; .*, where it may go back'),
+    'times of 32 bits': (npz(t=(1e5 + T).astype(np.float32), x=X), ANY, 'time, which counts in steps of 0.0078125 s'),
     'too few digits': (csv([f'{1.7e9 + t:.6e}' for t in T], X), {}, 'the times of .signal. do not grow'),
     'newest first': (csv(T[::-1], X[::-1]), {}, 'the times of .signal. do not grow'),
-    'a time twice behind rows in disorder': (
-        csv(np.where(np.arange(N) == 300, T[299], T)[np.r_[:10, 11, 10, 12:N]], X), {}, 'row 301, .*1 times come twice',
-    ),
-    'logs overlap by few rows': (csv(np.r_[T[:300], T[297:]], np.r_[X[:300], X[297:]]), {}, CORK),
+    'logs overlap by few rows': (csv(np.r_[T[:300], T[297:]], np.r_[X[:300], X[297:]]), {}, BACK),
     'logs overlap': (
         csv(np.r_[T[:300], T[200:]], np.r_[X[:300], X[200:]]), {'slides': {'by': 'pause'}},
         'row 302, .*time goes back to 2 s, into the run that began at 0 s; save each row once',
     ),
     'runs overlap': (csv(OVERLAP, X), {}, 'row 302, .*time goes back from 2.99 to 2.7 s, .*by: pause'),
-    'runs overlap by pause': (csv(OVERLAP, X), PAUSE, [('cork', X[:300]), ('cork', X[300:])]),
-    'a row ahead': (
-        csv(np.where(np.arange(N) == 300, T + 0.05, T).round(2), X), {},
-        [('cork', np.where((T > 2.995) & (T < 3.045), np.nan, X))],
-    ),
+    'runs overlap by pause': (csv(OVERLAP, X), PAUSE, 'row 302, .*time goes back to 2.7 s, into the run that began'),
+    'a row twice': (csv(np.insert(T, 9, T[9]), np.insert(X, 9, X[9])), {}, '1 times come twice.*save each row once'),
+    'a row ahead': (csv(np.where(np.arange(N) == 300, T + 0.05, T).round(2), X), {}, 'row 303, .*3.05 to 3.01 s, 1 t'),
 }  # fmt: skip
 
 
@@ -191,14 +184,17 @@ def test_clocks(tmp_path: Path, name: str) -> None:
 
 @pytest.mark.parametrize('size', [2, 3, 5, 10, 20, 30])
 @pytest.mark.parametrize('step_s', [0.0, 50e-6])
-def test_rows_of_a_buffer_have_the_rate_of_rows_and_duration(tmp_path: Path, size: int, step_s: float) -> None:
-    check(tmp_path, csv(bursts(size, step_s), X), {}, CORK)
-    [slide] = SlideDataset.from_bags([tmp_path / 'bags'])
-    assert slide.signals['signal'][0].sampling_rate_hz == pytest.approx(100.0, rel=0.01)
+def test_rows_of_a_buffer_are_refused_and_the_rate_that_they_have_is_enough(
+    tmp_path: Path, size: int, step_s: float
+) -> None:
+    check(tmp_path, csv(bursts(size, step_s), X), {}, 'a buffer .*stamped when it .*give `rate_hz`|is 3.333 Hz')
+    (tmp_path / 'again').mkdir()
+    check(tmp_path / 'again', csv(bursts(size, step_s), X), RATE, CORK)
 
 
 SAME = r'.* have the same samples in all or in a part; a copy is no further slide, nor is an overlapping window'
 LONG = np.random.default_rng(0).normal(size=180_000).round(4)
+COARSE = np.rint(2 * np.random.default_rng(2).normal(size=(3, N))).astype(int)
 HUMS = np.rint(5 * np.sin(np.pi * np.arange(20_000) / 10) + np.random.default_rng(0).normal(0, 0.05, (2, 20_000)))
 HALVES: Truth = [('cork', X[:300]), ('felt', X[300:])]
 CODES = {'label': {'column': 'l', 'names': {0: 'cork', 1: 'felt'}}, 'slides': {'by': 'column', 'column': 'l'}}
@@ -211,6 +207,10 @@ PARTS = {**ANY, **RATE, 'files': '{a}_{run}.*', 'tables': 'data/{i}'}
 
 def coded(codes: Any) -> Write:
     return csv(T, X, codes, names='t,x,l')
+
+
+def tone(number: int) -> np.ndarray:
+    return np.sin((0.3 + 0.03 * number) * np.arange(N)).round(4)
 
 
 def grouped(folder: Path) -> None:
@@ -292,8 +292,31 @@ LABELS: dict[str, tuple[Write, dict, Truth]] = {
     'a slow stream that is the same beside one that is not': (
         npz(**{f'{number}/{name}': one for number, fast in enumerate((LONG[:3000], LONG[4000:7000]))
                for name, one in (('x', fast), ('y', LONG[3000:3060]))}),
-        {**ANY, 'streams': SLOW, 'tables': '{i}'}, [('cork', LONG[:3000]), ('cork', LONG[4000:7000])],
+        {**ANY, 'streams': SLOW, 'tables': '{i}'}, SAME,
     ),
+    **{
+        f'a copy {name}': (
+            both(csv(T, U, V, names='t,x,y'), csv(T, x, y, names='t,x,y', name='felt_7.csv')),
+            {'streams': {'signal': {'columns': ['x', 'y'], 'time': {'column': 't'}}}},
+            f"'felt_7.csv/1' and 'cork_1.csv/1' {SAME}",
+        )
+        for name, x, y in (
+            ('with an offset', U + 0.37, V - 5.1), ('with a factor', -2.5 * U, 9.81 * V),
+            ('with exchanged channels', V, U), ('of one channel', U, X), ('of the other channel', Y, V),
+            ('that runs back', U[::-1], V[::-1]),
+            ('of a half with all of these', 3 - X, np.r_[Y[:300], 3 - 2 * U[:300][::-1]]),
+        )
+    },
+    **{
+        f'a copy of coarse channels {name}': (
+            both(csv(T, *COARSE, names='t,x0,x1,x2'), csv(T, *other, names='t,x0,x1,x2', name='felt_7.csv')),
+            {'streams': {'signal': {'columns': ['x0', 'x1', 'x2'], 'time': {'column': 't'}}}}, SAME,
+        )
+        for name, other in (
+            ('as it is', COARSE), ('with an offset', COARSE + 7), ('that runs back', COARSE[:, ::-1]),
+            ('in another order', COARSE[[2, 0, 1]]),
+        )
+    },
     'a copy among others': (
         both(csv(T, X), csv(T, Y, name='felt_2.csv'), csv(T, np.r_[Y[:400], X[:200]], name='felt_3.csv')), {}, SAME,
     ),
@@ -304,9 +327,9 @@ LABELS: dict[str, tuple[Write, dict, Truth]] = {
     **{
         f'no copy: {name}': (both(csv(T, one), csv(T, other, name='felt_7.csv')), {}, [('cork', one), ('felt', other)])
         for name, one, other in (
-            ('a period', np.tile(X[:50], 12), np.tile(X[:50], 12)[7:].repeat(2)[:N]),
+            ('a period', np.tile(X[:50], 12), np.tile(X[:50], 13)[7 : N + 7]),
             ('a period that begins later', np.tile(X[:100], 6), np.r_[Y[:3], np.tile(X[:100], 6)][:N]),
-            ('few samples', X, np.r_[Y[:300], X[300:350], Y[350:]]),
+            ('few samples', X, np.r_[Y[:300], X[300:320], Y[320:]]),
         )
     },
     'a hum of few levels, and again': (
@@ -316,9 +339,6 @@ LABELS: dict[str, tuple[Write, dict, Truth]] = {
     'a run twice in a file': (
         csv(np.r_[T[:300], 9 + T[:300]], np.tile(X[:300], 2)), {'slides': {'by': 'pause'}},
         "slides 'cork_1.csv/2' and 'cork_1.csv/1'",
-    ),
-    'a stream that is the same and one that is not': (
-        both(csv(X, Y, names='x,y'), csv(X, -Y, names='x,y', name='felt_2.csv')), BOTH, [('cork', X), ('felt', X)],
     ),
     'a trial without a label': (
         csv(T, X, np.repeat([1, 2], 300), np.repeat(['cork', ''], 300), names='t,x,trial,l'),
@@ -334,12 +354,12 @@ LABELS: dict[str, tuple[Write, dict, Truth]] = {
         {'label': {'column': 'l'}, 'slides': {'by': 'column', 'column': 'trial'}}, HALVES,
     ),
     'groups in the order of their numbers': (
-        npz(**{f'data/{number}/x': number * X for number in (1, 10, 11, 2)}), PARTS | {'label': {'value': 'cork'}},
-        [('cork', number * X) for number in (1, 2, 10, 11)],
+        npz(**{f'data/{number}/x': tone(number) for number in (1, 10, 11, 2)}), PARTS | {'label': {'value': 'cork'}},
+        [('cork', tone(number)) for number in (1, 2, 10, 11)],
     ),
     'files in the order of their numbers': (
-        both(*(csv(T, number * X, name=f'cork_{number}.csv') for number in (1, 10, 2))), {},
-        [('cork', number * X) for number in (1, 2, 10)],
+        both(*(csv(T, tone(number), name=f'cork_{number}.csv') for number in (1, 10, 2))), {},
+        [('cork', tone(number)) for number in (1, 2, 10)],
     ),
     'a list of labels next to the elements': (grouped, PARTS, "no column 'material'"),
 }  # fmt: skip
@@ -444,8 +464,8 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
         {**ANY, 'streams': {'signal': BY_ROW}, 'slides': {'by': 'column', 'column': 'trial'}}, SAME,
     ),
     'columns in another order': (
-        both(csv(T, X, Y, names='t,ax,ay'), csv(X, 2 * Y, T, names='ay,ax,t', name='felt_1.csv')), AXES,
-        [('cork', np.c_[X, Y]), ('felt', np.c_[2 * Y, X])],
+        both(csv(T, X, Y, names='t,ax,ay'), csv(U, V, T, names='ay,ax,t', name='felt_1.csv')), AXES,
+        [('cork', np.c_[X, Y]), ('felt', np.c_[V, U])],
     ),
     **{
         f'a file with {names}': (
@@ -467,7 +487,7 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
         )
     },
     'whole numbers that are far from 0 and fit': (
-        far(2**24 - 9, 'i4'), {**ANY, **RATE}, [('cork', np.rint(X) + 2**24 - 9)],
+        far(2**23, 'i4', 50.0), {**ANY, **RATE}, [('cork', np.rint(50 * X) + 2**23)],
     ),
     'a constant channel that is rounded': (
         csv(X, [0.1] * N, names='x,y'), {'streams': {'signal': {'columns': ['x', 'y'], 'rate_hz': 100.0}}},
@@ -479,6 +499,42 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
     'a slide that stands still': (
         both(csv(T, X), csv(T, [1.5] * N, name='felt_1.csv')), {}, CORK,
     ),
+    **{
+        f'a sensor that is frozen for {count} rows': (
+            both(csv(T, V, U, names='t,x,y'),
+                 csv(T, *np.where((T > 1) & (1 + count / 100 > T), [[0.5], [0.25]], [X, Y]), names='t,x,y',
+                     name='felt_1.csv')),
+            {'streams': {'signal': {'columns': ['x', 'y'], 'time': {'column': 't'}}}}, truth,
+        )
+        for count, truth in (
+            (30, [('cork', np.c_[V, U])]),
+            (8, [('cork', np.c_[V, U]), ('felt', np.where(((T > 1) & (T < 1.08))[:, None], [0.5, 0.25], np.c_[X, Y]))]),
+        )
+    },
+    **{
+        f'{count} rows of each sample': (
+            csv(T, X.repeat(count)[:N]), {}, f"each sample of 'signal' comes {count} times, as if a slower sensor were",
+        )
+        for count in (2, 3, 7)
+    },
+    **{
+        f'a column twice by {columns}': (
+            csv(T, X, Y, names='t,x,y'),
+            {'streams': {'signal': {'columns': columns, 'channels': channels, 'rate_hz': 100.0}}}, sentence,
+        )
+        for columns, channels, sentence in (
+            (['x', 'x'], [], r"'signal' has 'x' twice under `columns`; name each once"),
+            (['y', '[xy]'], [], r"'signal' has 'y' twice under `columns`"),
+            (['x', 'y'], ['a', 'a'], r"'signal' has 'a' twice under `channels`"),
+        )
+    },
+    **{
+        f'{name} as a channel': (
+            csv(times, X, names='t,x'), {'streams': {'signal': {'columns': ['*'], 'rate_hz': 100.0}}},
+            "channel 't' of 'signal' rises from each sample to the next, as time or a counter does; leave it out of",
+        )
+        for name, times in (('time', T), ('time that jitters', T + 0.004 * (np.arange(N) % 3)), ('a counter', range(N)))
+    },
     'a stream that stands still': (csv(X, [1.5] * N, names='x,y'), BOTH, "no channel of 'signal_static' changes"),
     'no slide that changes': (
         csv(T, [1.5] * 100 + [''] + [1.5] * 499), {}, 'with samples that change .*: 1 slides in which no ch',
@@ -529,6 +585,7 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
             ('old Excel', b'\xd0\xcf\x11\xe0' + bytes(99), 'is a file of Excel,'),
             ('UTF-16', 't,x\n1,2\n'.encode('utf-16'), 'is a file of UTF-16, .* in UTF-8'),
             ('CR', b't,x\r1,2\r3,4\r', 'ends lines with CR alone'),
+            ('PNG', b'\x89PNG\r\n\x1a\n\0\0\0\rIHDR', "'cork_1.csv' is a file of bytes and not of text, whatever"),
         )
     },
     'another delimiter': (
@@ -1040,7 +1097,7 @@ def test_blanks_belong_to_the_slower_stream(tmp_path: Path, every: int) -> None:
 
 @pytest.mark.parametrize('per_row', [2, 22, 100])
 def test_consecutive_samples_of_a_row_are_one_channel(tmp_path: Path, per_row: int) -> None:
-    pac, slow = np.random.default_rng(0).normal(size=(per_row, 120)), np.arange(120.0)
+    pac, slow = np.random.default_rng(0).normal(size=(per_row, 120)), np.cos(np.arange(120.0))
     pac[:2, 7] = np.nan
     scipy.io.savemat(tmp_path / 'cork_1.mat', {'pac': pac, 'pdc': slow[None]})
     signal = {'columns': ['pac.*'], 'rate_hz': 100.0 * per_row, 'samples_per_row': per_row}
@@ -1051,30 +1108,30 @@ def test_consecutive_samples_of_a_row_are_one_channel(tmp_path: Path, per_row: i
     assert report.streams['cork', 'signal']['NaN'] == 2
 
 
-ACC = np.stack([X, 2 * X], axis=1)
+ACC, OTHER = np.stack([X, 2 * X], axis=1), np.stack([U, V], axis=1)
 
 
 def struct_array(path: Path) -> None:
     kind = [('acc', object), ('material', object)]
-    data = np.array([(ACC, 'cork'), (3 * ACC, 'felt')], dtype=kind)
+    data = np.array([(ACC, 'cork'), (OTHER, 'felt')], dtype=kind)
     scipy.io.savemat(path / 'a_1.mat', {'data': data})
 
 
 def nested_structs(path: Path) -> None:
     inner = {'acc': ACC, 'material': 'cork'}
-    scipy.io.savemat(path / 'a_1.mat', {'data': {'run1': inner, 'run2': {'acc': 3 * ACC, 'material': 'felt'}}})
+    scipy.io.savemat(path / 'a_1.mat', {'data': {'run1': inner, 'run2': {'acc': OTHER, 'material': 'felt'}}})
 
 
 def cell_of_structs(path: Path) -> None:
     cells = np.empty(2, object)
-    cells[:] = [{'acc': ACC, 'material': 'cork'}, {'acc': 3 * ACC, 'material': 'felt'}]
+    cells[:] = [{'acc': ACC, 'material': 'cork'}, {'acc': OTHER, 'material': 'felt'}]
     scipy.io.savemat(path / 'a_1.mat', {'data': cells})
 
 
 def hdf5_groups(path: Path) -> None:
     with h5py.File(path / 'a_1.h5', 'w') as file:
         for number, material in enumerate(('cork', 'felt'), 1):
-            file[f'data/{number}/acc'], file[f'data/{number}/material'] = number * ACC, material
+            file[f'data/{number}/acc'], file[f'data/{number}/material'] = (ACC, OTHER)[number - 1], material
 
 
 def matlab73_struct_array(path: Path) -> None:
@@ -1083,7 +1140,7 @@ def matlab73_struct_array(path: Path) -> None:
         for name in ('acc', 'material'):
             file.create_dataset(f'data/{name}', (1, 2), dtype=reference)
         for number, material in enumerate(('cork', 'felt')):
-            file[f'#refs#/a{number}'] = (1 + number) * ACC.T
+            file[f'#refs#/a{number}'] = (ACC, OTHER)[number].T
             text = file.create_dataset(f'#refs#/m{number}', data=np.frombuffer(material.encode(), 'u1').astype('u2'))
             text.attrs['MATLAB_class'] = np.bytes_('char')
             file['data/acc'][0, number] = file[f'#refs#/a{number}'].ref
@@ -1133,7 +1190,9 @@ def test_custom_messages_are_read_by_the_definition_in_the_bag_however_it_was_le
         where = loose if name == 'loose' else {'files': '{material}_{run}'}
         report = run(tmp_path / name, ('bag',), streams={'signal': stream}, **where)
         assert report.streams['cork', 'signal']['samples'] == 400, name
-        assert bool(report.left_out['bags were cut off, and end with their last whole part']) is (name == 'cut')
+        assert bool(report.left_out['bags were cut off: what came behind their last whole part is missing']) is (
+            name == 'cut'
+        )
 
 
 @pytest.mark.parametrize(

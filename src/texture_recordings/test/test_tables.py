@@ -13,6 +13,7 @@ from texture_core.types import NANOSECONDS
 from texture_recordings.bags import message_types
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.mapping import TableMapping, load_mapping, mapping_from
+from texture_recordings.public_sets import IMPORTS
 from texture_recordings.readers import MAPPED
 from texture_recordings.tables import ImportReport, import_tables
 
@@ -128,13 +129,17 @@ def test_a_row_of_units_within_a_slide_is_malformed_and_ends_none(tmp_path: Path
     assert report.left_out == {'malformed rows, NaN where they are in a slide': 6}
 
 
-def test_losses_and_rows_whose_times_contradict_each_other_are_counted(tmp_path: Path, mapping: TableMapping) -> None:
+def test_losses_are_counted_and_rows_whose_times_contradict_each_other_are_refused(
+    tmp_path: Path, mapping: TableMapping
+) -> None:
     recorded = recordings(files=1, jitter_ms=0.5)
     recorded[0].time_ms[FIRST_STROKE + 100 :] += 70.0  # seven samples are missing
-    recorded[0].time_ms[FIRST_STROKE + 50] -= 55.0  # before five others
     report = import_tables(mapping, write_csv(tmp_path / 'in', recorded), tmp_path / 'out')
-    assert total(report) == (9 * STROKE_ROWS - 6, 7 + 6)
-    assert report.left_out == {"rows out of order of 'signal'": 6}
+    assert total(report) == (9 * STROKE_ROWS, 7)
+    assert not report.left_out
+    recorded[0].time_ms[FIRST_STROKE + 50] -= 55.0  # before five others
+    with pytest.raises(InvalidData, match=r'time goes back from .* 1 times in this slide; sort its rows'):
+        import_tables(mapping, write_csv(tmp_path / 'again', recorded), None)
 
 
 @pytest.mark.parametrize(
@@ -148,7 +153,7 @@ def test_losses_and_rows_whose_times_contradict_each_other_are_counted(tmp_path:
         ('[stroke 1, stroke 2, stroke 3]', '[stroke 1, stroke 4]', "'phase' has 'stroke 4' in no file; it has rest"),
         ('{column: material}', '{column: materiel}', "no column 'materiel'; did you mean 'material'"),
         ('.csv', '.dat', "has the form '{day}, {material}, v{speed}.dat'"),
-        ('speed: {column: speed, unit: mm/s}', 'speed: {column: day}', "'day' is '2031-05-01' in its name"),
+        ('speed: {column: speed, unit: mm/s}', 'speed: {column: day}', "the speed is '2031-05-01', by 'day' in"),
     ],
 )  # fmt: skip
 def test_a_mapping_that_does_not_fit_is_refused_with_the_place(
@@ -173,6 +178,10 @@ def test_a_mapping_that_does_not_fit_is_refused_with_the_place(
         ),
         ({'slides': {'by': 'label'}}, 'mapping, slides: .* allowed is one of file, column, pause, row'),
         ({'conditions': {'speed': {'unit': 'mph'}}}, "the unit of speed is 'mph'; use one of m/s, cm/s, mm/s"),
+        (
+            {**TIMED, 'streams': {'signal': {'columns': ['x'], 'unit': 'gg'}}},
+            "'unit' is 'gg'; allowed is one of .*, g, m/s², ",
+        ),
         ({'files': '{a}_{a}.csv'}, 'has a field twice'),
         (
             {**TIMED, 'conditions': {'force': {'column': 't'}}},
@@ -202,23 +211,16 @@ def test_a_mapping_that_makes_no_sense_is_refused_with_a_sentence(content: objec
 
 
 def test_a_column_whose_name_is_a_long_number_is_refused_with_a_sentence(tmp_path: Path) -> None:
-    save(tmp_path, x=np.arange(300.0))
+    save(tmp_path, x=np.cos(np.arange(300.0)))
     mapping = mapping_from({'streams': {'signal': {'columns': [f'1-{"9" * 30_000}']}}, 'label': {'value': 'cork'}})
     with pytest.raises(InvalidData, match=r"no column '1-9+"):
         import_tables(mapping, tmp_path / 'in', tmp_path / 'out')
 
 
-def test_a_folder_in_place_of_a_mapping_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InvalidParameter, match='is a folder and no mapping; the mapping comes before the source'):
-        load_mapping(tmp_path)
-
-
-def test_a_folder_of_the_name_of_a_shipped_mapping_does_not_hide_it(tmp_path: Path, monkeypatch) -> None:
-    (tmp_path / 'icub20').mkdir()
-    monkeypatch.chdir(tmp_path)
-    assert load_mapping('icub20').sensor == 'roboskin/taxels'
-    with pytest.raises(InvalidParameter, match='is a folder and no mapping'):
-        load_mapping('./icub20')
+def test_a_folder_or_nothing_in_place_of_a_mapping_is_refused(tmp_path: Path) -> None:
+    for path in (tmp_path, tmp_path / 'nothing.yaml'):
+        with pytest.raises(InvalidParameter, match=r"there is no file '.*'; give a mapping \(YAML\), and behind it"):
+            load_mapping(path)
 
 
 def test_a_column_in_braces_and_whole_numbers_are_names() -> None:
@@ -269,29 +271,26 @@ def test_trials_of_arrays_for_machine_learning_are_slides(tmp_path: Path) -> Non
     np.testing.assert_allclose(read[1], samples[3], atol=1e-6)
 
 
-def test_arrays_whose_axes_were_mixed_up_are_put_in_order_by_a_shipped_mapping(tmp_path: Path) -> None:
+def test_arrays_whose_axes_were_mixed_up_are_put_in_order(tmp_path: Path) -> None:
     taxels = np.random.default_rng(0).normal(size=(75, 60))
     mixed = taxels.reshape(6, 75, 10).transpose(1, 0, 2).reshape(75, 60)  # six patches of ten taxels
     slides = {f'{name}/val_{k % 2}_0{k}': (k + len(name)) * mixed for name in ('oak', 'cork_oak') for k in range(3)}
-    import_tables(load_mapping('icub20'), save(tmp_path, **slides) / 'in', tmp_path / 'out')
+    IMPORTS['icub20'](save(tmp_path, **slides) / 'in', tmp_path / 'out')
     dataset = SlideDataset.from_bags([tmp_path / 'out'])
     assert dataset.condition('number').tolist() == [1, 2, 3] * 2
     for read in dataset.to_numpy('signal_static')[0]:
         np.testing.assert_allclose(read * (taxels[0, 0] / read[0, 0]), taxels, atol=1e-6)
 
 
-def test_an_order_of_axes_that_does_not_fit_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InvalidParameter, match='each axis of reshape is needed once'):
-        one_channel(format={'reshape': [5, 2], 'axes': [0, 2]})
-    mapping = one_channel(format={'reshape': [5, 7], 'axes': [1, 0]})
-    with pytest.raises(InvalidData, match=r'an array of the shape \(5, 6\) has 30 values'):
-        import_tables(mapping, save(tmp_path, x=np.zeros((5, 6))) / 'in', tmp_path / 'out')
+def test_arrays_of_another_shape_are_not_of_that_set(tmp_path: Path) -> None:
+    with pytest.raises(InvalidData, match=r'not a file of this data set: cannot reshape array of size 30'):
+        IMPORTS['icub20'](save(tmp_path, **{'oak/val_0_01': np.zeros((5, 6))}) / 'in', tmp_path / 'out')
 
 
 def test_slides_that_are_too_short_are_counted(tmp_path: Path) -> None:
     by = {'by': 'column', 'column': 'k'}
     mapping = one_channel(slides={**by, 'min_s': 0.5})
-    save(tmp_path, x=np.arange(150.0), k=np.repeat([1, 2, 3], [60, 20, 70]))
+    save(tmp_path, x=np.cos(np.arange(150.0)), k=np.repeat([1, 2, 3], [60, 20, 70]))
     report = import_tables(mapping, tmp_path / 'in', tmp_path / 'out')
     assert (sum(report.slides.values()), report.left_out['slides are too short']) == (2, 1)
     with pytest.raises(InvalidData, match='no slide of 5 s or more'):

@@ -657,20 +657,13 @@ COMMON: Mapping[str, Quality] = {
 }
 
 
-def quality_of(topic: str) -> Quality | None:
-    """Return the quality of service of a topic by its whole name; None if it is no topic of the suite."""
-    if topic.endswith('_baseline'):
-        return LATCHED
-    return COMMON.get(topic, QUALITIES.get(short_name(topic)))
-
-
 class BagWriter:
     """Write a new bag; use it in a `with` block, at the end of which the bag is complete."""
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         self._connections: dict[tuple[str, str], Connection] = {}
-        self.qualities: dict[str, Quality] = {}  # of topics unknown to `quality_of`, as they were offered
+        self.qualities: dict[str, Quality] = {}  # of topics that are none of the suite, as they were offered
         if self.path.exists():
             raise InvalidData(f"'{path}' exists already; a bag is never overwritten, name another or remove it")
         self._writer = Writer(self.path, version=8, storage_plugin=StoragePlugin.MCAP)
@@ -689,11 +682,6 @@ class BagWriter:
     def write(self, topic: str, value: Any, log_ns: int) -> None:
         """Write a data class of texture_core as received at `log_ns`."""
         self.write_raw(RawMessage(topic, TYPES[type(value)], log_ns, encode(value)))
-
-    def write_all(self, messages: Iterable[tuple[int, str, Any]]) -> None:
-        """Write (log time in ns, topic, data class) in the order of the log times."""
-        for log_ns, topic, value in sorted(messages, key=lambda message: message[0]):
-            self.write(topic, value, log_ns)
 
     def write_raw(self, message: RawMessage) -> None:
         """Write a message that is CDR already."""
@@ -729,7 +717,8 @@ class BagWriter:
 
     def _connect(self, topic: str, msgtype: str) -> Connection:
         name = topic if topic.startswith('/') else f'/{topic}'
-        quality = quality_of(name) or self.qualities.get(name)
+        known = LATCHED if name.endswith('_baseline') else COMMON.get(name, QUALITIES.get(short_name(name)))
+        quality = known or self.qualities.get(name)
         # For `ros2 bag play`, which offers what was offered when it was recorded.
         qos = [_offered(quality)] if quality else []
         return self._writer.add_connection(name, msgtype, typestore=typestore(), offered_qos_profiles=qos)
@@ -754,11 +743,7 @@ SlideStreams = Mapping[str, tuple[TactileSignal, NDArray[Any]]]
 
 
 def slide_batches(
-    signal: TactileSignal,
-    index: NDArray[Any],
-    start_ns: int,
-    *,
-    batch_s: float = BATCH_S,
+    signal: TactileSignal, index: NDArray[Any], start_ns: int, *, batch_s: float = BATCH_S
 ) -> Iterator[TactileSignal]:
     """Yield the samples of a slide in batches; each loss begins a new one."""
     rate_hz, first = signal.sampling_rate_hz, signal.first_sample
@@ -790,12 +775,7 @@ class SlideBags:
         """Paths of the bags in the order in which they were begun."""
         return [bag.path for bag in self._bags.values()]
 
-    def write(
-        self,
-        session: str,
-        states: Sequence[ExplorationState],
-        streams: SlideStreams,
-    ) -> None:
+    def write(self, session: str, states: Sequence[ExplorationState], streams: SlideStreams) -> None:
         """Write a slide, whose stamps count from 0, and its end into the bag of a session."""
         bag = self._bag(session)
         if bag is None:
@@ -815,7 +795,8 @@ class SlideBags:
             log_ns = at_ns + DELAY_NS * (2 * (state.stamp_ns > 0) + (state.phase is Phase.DONE))
             stamped = replace(state, stamp_ns=at_ns, steady_s=steady_s, progress=state.stamp_ns / end_ns)
             messages.append((log_ns, EXPLORATION, stamped))
-        bag.write_all(messages)
+        for log_ns, topic, value in sorted(messages, key=lambda message: message[0]):
+            bag.write(topic, value, log_ns)
         self._now_ns += end_ns + PAUSE_NS
 
     def _bag(self, session: str) -> BagWriter | None:

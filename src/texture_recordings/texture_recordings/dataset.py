@@ -157,11 +157,22 @@ class SlideDataset:
             If the numbers of slides or channels contradict each other.
         """
         count = len(labels)
-        _check_counts(signals, rates_hz, count)
-        numbers = {
-            name: _one_each(name, values, count)
-            for name, values in (('speed_m_s', speed_m_s), ('force_n', force_n), ('direction_rad', direction_rad))
-        }
+        for topic, arrays in signals.items():
+            if len(arrays) != count or topic not in rates_hz:
+                raise InvalidData(
+                    f"'{topic}' has {len(arrays)} slides and the rate {rates_hz.get(topic)} for {count} labels; "
+                    'give one array (n_samples, n_channels) for each label, and the rate of each topic in Hz'
+                )
+        if not signals:
+            raise InvalidData("no signal was given; give arrays by topic, such as {'signal': [...]}")
+        numbers: dict[str, Array] = {}
+        for name, values in (('speed_m_s', speed_m_s), ('force_n', force_n), ('direction_rad', direction_rad)):
+            array = np.asarray(values, dtype=np.float64)
+            if array.shape not in ((), (count,)):
+                raise InvalidData(
+                    f'{name} has the shape {array.shape}; give one number, or one for each of {count} slides'
+                )
+            numbers[name] = np.broadcast_to(array, (count,))
         slides, start_ns = [], 0
         for index, label in enumerate(labels):
             batches = {
@@ -404,11 +415,13 @@ class SlideDataset:
         resized: list[FeatureVector] = []
         for slide, events in self.windows(feature_set):
             described = _described(slide, feature_set, events)
-            kinds = [one.feature_set.partition(' ')[2] for one in (*vectors[:1], *described[:1])]
+            both = (*vectors[:1], *described[:1])
+            kinds = [one.feature_set.partition(' ')[2] for one in both]
             if len(set(kinds)) > 1:
                 raise ModelMismatch(
-                    f"slide '{slide.name}' in '{slide.bag}' has {kinds[1]}, and those before it {kinds[0]} (rate × "
-                    "channels); use slides of one kind, and where a driver measures the rate, set 'rate_hz'"
+                    f"slide '{slide.name}' in '{slide.bag}' has {kinds[1]} of the sensor '{both[1].sensor}', and those "
+                    f"before it {kinds[0]} of '{both[0].sensor}' (rate × channels); use slides of one kind, and where "
+                    "a driver measures the rate, set 'rate_hz'"
                 )
             vectors += described
             resized += feature_set.extract_many(_windows_over(slide, feature_set, distances_m))
@@ -560,24 +573,6 @@ def _grouped(values: Array, *, circular: bool) -> Array:
     result = np.empty(len(values))
     result[order] = [float(f'{mean:.3g}') for mean in means[group]]
     return result
-
-
-def _check_counts(signals: Mapping[str, Sequence[AnyArray]], rates_hz: Mapping[str, float], count: int) -> None:
-    for topic, arrays in signals.items():
-        if len(arrays) != count or topic not in rates_hz:
-            raise InvalidData(
-                f"'{topic}' has {len(arrays)} slides and the rate {rates_hz.get(topic)} for {count} labels; "
-                'give one array (n_samples, n_channels) for each label, and the rate of each topic in Hz'
-            )
-    if not signals:
-        raise InvalidData("no signal was given; give arrays by topic, such as {'signal': [...]}")
-
-
-def _one_each(name: str, values: float | Sequence[float], count: int) -> Array:
-    array = np.asarray(values, dtype=np.float64)
-    if array.shape not in ((), (count,)):
-        raise InvalidData(f'{name} has the shape {array.shape}; give one number, or one for each of {count} slides')
-    return np.broadcast_to(array, (count,))
 
 
 def _batch(array: AnyArray, template: tuple[str, Sequence[str] | None, float], start_ns: int) -> TactileSignal:

@@ -15,7 +15,7 @@ from texture_core.config import library, writing, yaml_text
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.types import AnyArray
 from texture_recordings.dataset import SlideDataset
-from texture_recordings.mapping import CONDITION_COLUMNS
+from texture_recordings.mapping import CONDITION_COLUMNS, UNITS
 from texture_recordings.slides import STREAMS, SlideSamples
 
 FACTS = ('slide', 'surface', 'number', 'session', *CONDITION_COLUMNS.values(), 'time_s')
@@ -113,8 +113,8 @@ def _mapping(topic: str, samples: Sequence[SlideSamples]) -> Mapping[str, Any]:
     channels = list(first.channels)
     names = {one.surface: one.surface for one in samples}  # also those that differ in case alone
     stream = {
-        'columns': channels, 'channels': channels, 'unit': batch.common_unit, 'rate_hz': first.rate_hz,
-        'samples_per_row': 1,
+        'columns': channels, 'channels': channels, 'rate_hz': first.rate_hz, 'samples_per_row': 1,
+        'unit': batch.common_unit if batch.common_unit in UNITS else '',
     }  # fmt: skip
     return {
         'files': f'{topic}.parquet', 'streams': {topic: stream}, 'label': {'column': 'surface', 'names': names},

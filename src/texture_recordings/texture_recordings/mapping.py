@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from texture_core.config import find_file, from_mapping, load_yaml, param, shipped, unknown_name
+from texture_core.config import from_mapping, load_yaml, param, unknown_name
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.types import MAX_HZ
 from texture_recordings.slides import STREAMS
@@ -46,6 +46,10 @@ def template_fields(template: str, name: str) -> dict[str, str] | None:
     return {key: text for key, text in zip(names, found[0], strict=True) if key}
 
 
+UNITS = (
+    '', 'count', 'g', 'm/s²', 'm/s', 'm', 'mm', 'rad/s', 'rad', 'deg', 'Pa', 'hPa', 'kPa', 'bar', 'N', 'mN', 'N m', 'T',
+    'mT', 'µT', 'G', 'V', 'mV', 'A', 'mA', 'C', 'pC', 'F', 'pF', 'Ω', 'kΩ', '°C', 'K', '%',
+)  # fmt: skip
 TIME_UNITS: Mapping[str, float] = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'min': 60.0}
 # How names of columns end that name their unit: t_ms, 't (s)', 'time [us]'; in the order of TIME_UNITS.
 UNIT_IN_NAME = re.compile(
@@ -69,19 +73,6 @@ class FileFormat:
     skip_rows: int = param(0, 'Number of lines of a text file that are skipped at its top.', low=0, high=10_000)
     header: bool = param(True, 'Says whether a row with names of columns comes first; without, they count from 0.')
     transpose: bool = param(False, 'Says whether arrays are (n_channels, n_samples) and not (n_samples, n_channels).')
-    reshape: list[int] = param(  # noqa: RUF009 – it gives a field
-        [], 'Shape in which the values of an array are read, for arrays that were stored with mixed up axes.'
-    )
-    axes: list[int] = param(  # noqa: RUF009 – it gives a field
-        [], 'Order of the axes of `reshape` in which the values fill the shape of the array, all from 0.'
-    )
-
-    def __post_init__(self) -> None:
-        if sorted(self.axes) != list(range(len(self.reshape))):
-            raise InvalidParameter(
-                f'format: reshape is {self.reshape} and axes are {self.axes}; each axis of reshape is needed once, '
-                'such as reshape: [75, 6, 10] and axes: [1, 0, 2]'
-            )
 
 
 @dataclass(frozen=True)
@@ -113,7 +104,7 @@ class StreamColumns:
     channels: list[str] = param(  # noqa: RUF009 – it gives a field
         [], 'Names the channels in the bag; [] takes the names of the columns.'
     )
-    unit: str = param('', "Names the unit of the samples after scaling, such as 'g' or 'Pa'; '' if unknown.")
+    unit: str = param('', "Names the unit of the samples after scaling; '' if unknown.", choices=UNITS)
     scale: float = param(1.0, 'Factor by which samples are multiplied.')
     rate_hz: float = param(
         0.0, 'Sampling rate; 0 takes it from the column of time, or from the file.', unit='Hz', low=0.0, high=MAX_HZ
@@ -218,10 +209,6 @@ class TableMapping:
             if quantity.unit and quantity.unit not in CONDITION_UNITS[name]:
                 units = ', '.join(CONDITION_UNITS[name])
                 raise InvalidParameter(f"the unit of {name} is '{quantity.unit}'; use one of {units}")
-            try:
-                float(quantity.value or 0.0)
-            except ValueError as error:
-                raise InvalidParameter(f"the {name} is '{quantity.value}'; write a number, such as 0.05") from error
         if not self.streams or not set(self.streams) <= set(STREAMS):
             raise InvalidParameter(
                 f'the streams are {", ".join(self.streams) or "none"}; name {" or ".join(STREAMS)}, or both'
@@ -261,11 +248,10 @@ class TableMapping:
         return [name for name in names if name]
 
 
-def load_mapping(name_or_path: str | Path) -> TableMapping:
-    """Return the mapping in a file, or one that the package ships in config/mappings, by name."""
-    if Path(name_or_path).is_dir() and str(name_or_path) not in shipped('texture_recordings', 'config/mappings'):
-        raise InvalidParameter(f"'{name_or_path}' is a folder and no mapping; the mapping comes before the source")
-    path = find_file(str(name_or_path), 'texture_recordings', 'config/mappings', 'mapping')
+def load_mapping(given: str | Path) -> TableMapping:
+    """Return the mapping in a file; a sensor that it does not name has the name of the file."""
+    if not (path := Path(given).expanduser()).is_file():
+        raise InvalidParameter(f"there is no file '{given}'; give a mapping (YAML), and behind it the source")
     mapping = mapping_from(load_yaml(path, 'mapping'), f"mapping '{path}'")
     return mapping if mapping.sensor else replace(mapping, sensor=path.stem)
 

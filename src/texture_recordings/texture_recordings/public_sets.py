@@ -76,10 +76,7 @@ class PublicSet:
 
 
 def _chosen(
-    found: Mapping[str, Sequence[Any]],
-    slides: str,
-    surfaces: Sequence[str],
-    number_of: Callable[[tuple[Any, ...]], int] | None,
+    found: Mapping[str, Sequence[Any]], slides: str, surfaces: Sequence[str], number_of: Callable[[Any], int] | None
 ) -> list[Any]:
     """Return the wanted slides, each behind its surface, numbered separately for each surface."""
     for name in surfaces:
@@ -206,6 +203,7 @@ def _at(time_s: float, times: AnyArray, values: AnyArray) -> float:
 # Samples (n, n_channels), speed (m/s), force (N) and direction (rad), NaN if unknown, and the samples in which the
 # finger slides: before them it is in contact, after them it lifts; None for all.
 SteadySlide = tuple[AnyArray, float, float, float, range | None]
+UNKNOWN = (math.nan, math.nan, math.nan)
 
 
 def _steady(
@@ -353,6 +351,17 @@ IMPORTS: Mapping[str, PublicSet] = {
         slide=_steady('signal_static', partial(_signal, *CPM, NOMINAL_HZ), _fingersense_slide),
         dated=True,
     ),
+    # 20 materials × 30 slides of 1.5 s by 60 capacitive taxels of an iCub (Gao et al. 2020), numbered by the fold of
+    # the authors; no order in time is known. The file has times and patches of the skin mixed up: read as 75 times of 6
+    # patches of 10 taxels, the mean step from one time to the next falls from 7.1 to 0.19.
+    'icub20': PublicSet(
+        'slides.npz', r'slides/([^/]+)/val_(\d+)_(\d+)',
+        order=lambda material, fold, number: (material, (int(fold), int(number))),
+        slide=_steady(
+            'signal_static', partial(_signal, 'roboskin/taxels', tuple(map(str, range(60))), '', 50.0),
+            lambda _, recorded: (recorded.reshape(75, 6, 10).swapaxes(0, 1).reshape(75, 60), *UNKNOWN, None),
+        ),
+    ),
     # Contact sound of 29 textures that a tool strokes by hand (Strese et al. 2014), as stored in the history of
     # github shinolab/vibrotactile-autoencoder, joined into one file. The whole stroke counts as sliding; speed, force
     # and direction are unknown.
@@ -361,7 +370,7 @@ IMPORTS: Mapping[str, PublicSet] = {
         order=lambda texture, number: (texture, (int(number),)),
         slide=_steady(
             'signal', partial(_signal, 'lmt/microphone', ('sound',), 'count', 22_050.0),
-            lambda _, recorded: (recorded[:, :1], math.nan, math.nan, math.nan, None), motion='',
+            lambda _, recorded: (recorded[:, :1], *UNKNOWN, None), motion='',
         ),
     ),
 }  # fmt: skip

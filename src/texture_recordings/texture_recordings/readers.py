@@ -182,7 +182,7 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
         rest, delimiter, names = _opened(opened, form)
         numbers, conditions = _wanted(mapping, names, delimiter)
         numeric: dict[str, bool] = {}
-        thousands = Thousands(numbers, form.decimal)
+        whole_numbers: set[str] = set()
         # Block by block: the cells, what they are, and the rows that are malformed.
         for block in iter(lambda: list(islice(rest, BLOCK_ROWS)), []):
             take(len(block) * (len(names) + len(mapping.texts())))
@@ -210,14 +210,11 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
                     elif row not in bad and WORD.search(cells[row]) and cells[row].lower() not in NO_WORD:
                         words[row] = name
                 _refuse_codes(name, () if text else cells, delimiter)
-                thousands.add(name, cells)
+                if name in numbers:
+                    _refuse_thousands(name, cells, form.decimal, whole_numbers)
                 part[name] = _texts(cells) if text else values
             numbered = [number for number, _ in block]
-            _refuse_other_rows(
-                names,
-                {numbered[row]: rows[row] for row in bad},
-                {numbered[row]: words[row] for row in sorted(words.keys() - bad.keys())},
-            )
+            _refuse_other_rows(names, numbered, {row: rows[row] for row in bad}, words)
             left = sorted(gaps.keys() - bad.keys())
             reasons |= {numbered[row]: bad[row] for row in sorted(bad)[: max(0, EXAMPLES - len(reasons))]}
             gap_reasons |= {numbered[row]: gaps[row] for row in left[: max(0, EXAMPLES - len(gap_reasons))]}
@@ -227,7 +224,6 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
             parts.append(part)
     if not parts:
         raise InvalidData('it has no rows below the names of its columns; choose files with samples')
-    thousands.refuse()
     columns = {name: np.concatenate([part[name] for part in parts]) for name in names}
     marked = np.concatenate(junk)
     # A malformed row ends no slide: it has the texts of the one before.
@@ -250,21 +246,20 @@ def _wanted(mapping: TableMapping, names: Sequence[str], delimiter: str) -> tupl
     return {*samples, *mapping.numbers()}, {*mapping.numbers()} - needed
 
 
-def _refuse_other_rows(names: Sequence[str], malformed: Mapping[int, Sequence[str]], words: Mapping[int, str]) -> None:
-    """Refuse rows, by their numbers, of names or units.
-
-    These are malformed ones with the name of a column, and others with a word in an unused column of numbers.
-    """
-    for number, cells in malformed.items():
+def _refuse_other_rows(
+    names: Sequence[str], numbered: Sequence[int], malformed: Mapping[int, Sequence[str]], words: Mapping[int, str]
+) -> None:
+    """Refuse rows of names or units: malformed ones with the name of a column, others with a word in unused numbers."""
+    for row, cells in malformed.items():
         if {*cells} & {*names}:
             raise InvalidData(
-                f'row {number}: the names of the columns come again, {", ".join(cells[:5])}, so another recording may '
-                'begin there; split the file there'
+                f'row {numbered[row]}: the names of the columns come again, {", ".join(cells[:5])}, so another '
+                'recording may begin there; split the file there'
             )
-    for number, name in words.items():
+    for row in sorted(words.keys() - malformed.keys()):
         raise InvalidData(
-            f"row {number}, column '{name}': a word in a column of numbers that no key uses: the row may be one of "
-            f"units or means; remove it, or read texts there by rows: {{{name!r}: '*'}}"
+            f"row {numbered[row]}, column '{words[row]}': a word in a column of numbers that no key uses: the row may "
+            f"be one of units or means; remove it, or read texts there by rows: {{{words[row]!r}: '*'}}"
         )
 
 
@@ -272,6 +267,8 @@ def _opened(opened: Any, form: FileFormat) -> tuple[Iterator[tuple[int, str]], s
     """Return the lines of rows, the delimiter, and the names of the columns by the first row."""
     if found := [kind for begin, kind in OTHER_FILES.items() if opened.peek(4).startswith(begin)]:
         raise InvalidData(f'it is a file of {found[0]}, whatever its name; unpack it, or save it as CSV in UTF-8')
+    if b'\0' in opened.peek():
+        raise InvalidData('it is a file of bytes and not of text, whatever its name; save it as CSV in UTF-8')
     rest = _lines(opened, form)
     first = next(rest, (0, ''))
     if '\r' in first[1].rstrip('\r\n'):
@@ -285,14 +282,13 @@ def _names(cells: Sequence[str], form: FileFormat, line: int) -> list[str]:
     """Return the names of the columns by the first row."""
     if cells == ['']:
         raise InvalidData('it is empty, or has comments only; choose files with samples')
-    if not cells or '\0' in cells[0]:
+    if not cells:
         raise InvalidData('it has no columns; give a text file in UTF-8 with a row for each sample')
     if len(cells) > MAX_CHANNELS:
         raise InvalidData(f'it has {len(cells)} columns; at most {MAX_CHANNELS} are read, split it')
     if not form.header:
         return [str(number) for number in range(len(cells))]
-    twice = [name for name in cells if cells.count(name) > 1]
-    if twice:
+    if twice := [name for name in cells if cells.count(name) > 1]:
         raise InvalidData(f"it has the column '{twice[0]}' twice; give each column a different name")
     if np.isfinite([number_of(name) for name in cells]).all():
         raise InvalidData(
@@ -314,52 +310,35 @@ def _reason(name: str, cell: str, form: FileFormat) -> str:
 
 def _refuse_codes(name: str, cells: Sequence[str], delimiter: str) -> None:
     """Refuse digits that may stand behind a decimal comma, where commas are delimiters, too."""
-    digits = (
-        [cell for cell in cells if cell]
-        if delimiter == ',' and all(cell.isdigit() or not cell for cell in cells)
-        else []
-    )
-    if any(len(cell) > 1 and cell[0] == '0' for cell in digits) and digits != sorted(digits):
+    digits = [cell for cell in cells if cell]
+    padded = delimiter == ',' and any(len(cell) > 1 and cell[0] == '0' for cell in digits)
+    if padded and all(map(str.isdigit, digits)) and digits != sorted(digits):
         raise InvalidData(
             f"the column '{name}' holds digits such as {digits[0]}, so commas may be decimal as well as between "
             'columns; save it with another delimiter'
         )
 
 
-class Thousands:
-    """Columns whose signs may separate thousands: some cells have none, and three digits follow it in all others."""
+def _refuse_thousands(name: str, cells: Sequence[str], decimal: str, whole: set[str]) -> None:
+    """Refuse a column whose signs may separate thousands: three digits follow each, and some cells have none.
 
-    def __init__(self, names: Iterable[str], decimal: str) -> None:
-        self._decimal, self._sign = decimal, decimal or '.'
-        self._signed: dict[str, list[str]] = {name: [] for name in names}  # without columns of certain decimals
-        self._whole: set[str] = set()
-
-    def add(self, name: str, cells: Sequence[str]) -> None:
-        """Look at further cells of a column."""
-        if name not in self._signed:
-            return
-        signed = [cell for cell in cells if self._sign in cell]
-        if all(THOUSANDS[self._sign].fullmatch(cell) for cell in signed):
-            self._signed[name] += signed[:FEW_THOUSANDS]
-            self._whole |= {name} if any(cell.lstrip('+-').isdigit() for cell in cells) else set()
-        else:
-            del self._signed[name]
-
-    def refuse(self) -> None:
-        """Refuse a column in which it is a comma, or a point that the mapping does not call decimal."""
-        for name in self._signed.keys() & self._whole:
-            cells = self._signed[name]
-            if self._decimal == ',' and cells:
-                raise InvalidData(
-                    f"column '{name}': the comma of '{cells[0]}' seems to separate thousands; save numbers without "
-                    'such commas'
-                )
-            if not self._decimal and len(cells) >= FEW_THOUSANDS:
-                raise InvalidData(
-                    f"column '{name}': the point of '{cells[0]}' may be decimal or separate thousands, as three digits "
-                    "follow each one and other cells have none; write format: {decimal: '.'} if it is decimal, or "
-                    'save numbers without such points'
-                )
+    `whole` are the columns of which cells so far had none.
+    """
+    signed = [cell for cell in cells if (decimal or '.') in cell]
+    if any(cell.lstrip('+-').isdigit() for cell in cells):
+        whole.add(name)
+    if name not in whole or not signed or not all(THOUSANDS[decimal or '.'].fullmatch(cell) for cell in signed):
+        return
+    if decimal == ',':
+        raise InvalidData(
+            f"column '{name}': the comma of '{signed[0]}' seems to separate thousands; save numbers without such commas"
+        )
+    if not decimal and len(signed) >= FEW_THOUSANDS:
+        raise InvalidData(
+            f"column '{name}': the point of '{signed[0]}' may be decimal or separate thousands, as three digits follow "
+            "each one and other cells have none; write format: {decimal: '.'} if it is decimal, or save numbers "
+            'without such points'
+        )
 
 
 def _lines(opened: Any, form: FileFormat) -> Iterator[tuple[int, str]]:
@@ -633,7 +612,7 @@ def _frames(
         for column, name in members.items():
             array = load(name)
             take(array.size * max(1.0, array.dtype.itemsize / 8))
-            arrays[column] = _arranged(array, mapping.format)
+            arrays[column] = np.swapaxes(array, -1, -2) if mapping.format.transpose and array.ndim > 1 else array
         yield TableFrame(
             within, {**_unfolded(arrays, _meant(mapping)), **{key: np.array(text) for key, text in fields.items()}}
         )
@@ -643,17 +622,6 @@ def natural(name: str) -> list[tuple[int, str]]:
     """Return the key by which names are in the order of the numbers in them: 'run2' comes before 'run10'."""
     parts = re.split(r'([0-9]+)', name)
     return [(int(part[:MAX_TEXT]) if number % 2 else 0, part) for number, part in enumerate(parts)]
-
-
-def _arranged(array: AnyArray, form: FileFormat) -> AnyArray:
-    if form.reshape and array.ndim > 1:
-        if array.size != math.prod(form.reshape):
-            raise InvalidData(
-                f'an array of the shape {array.shape} has {array.size} values and cannot be read as '
-                f'{form.reshape}; correct `reshape` under `format`'
-            )
-        array = array.reshape(form.reshape).transpose(form.axes).reshape(array.shape)
-    return np.swapaxes(array, -1, -2) if form.transpose and array.ndim > 1 else array
 
 
 def _unfolded(arrays: Mapping[str, AnyArray], meant: set[str]) -> dict[str, AnyArray]:

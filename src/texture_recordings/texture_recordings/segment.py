@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from texture_core.cli import progress
-from texture_core.errors import InvalidData
+from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.types import ExplorationState, Phase, TactileSignal
 from texture_features.segmentation import SegmentationParams, segment_recording
 from texture_recordings.bags import EXPLORATION, BagWriter, find_bags, read_bag, read_named
@@ -18,11 +18,7 @@ FAST_TOPIC = 'signal'
 
 
 def segment_bags(
-    bags: Iterable[str | Path],
-    out: str | Path,
-    params: SegmentationParams,
-    surface: str = '',
-    namespace: str | None = None,
+    bags: Iterable[str | Path], out: Path, params: SegmentationParams, surface: str = '', namespace: str | None = None
 ) -> dict[Path, int]:
     """Copy bags, their exploration states replaced by those found in the signals; return the slides in each copy.
 
@@ -30,8 +26,10 @@ def segment_bags(
     messages are copied as they are.
     """
     paths = find_bags(bags)
+    if out.exists():
+        raise InvalidParameter(f"'{out}' exists already; nothing is overwritten, name another folder or remove it")
     return {
-        Path(out) / path.name: _segment(path, Path(out) / path.name, params, surface, namespace)
+        out / path.name: _segment(path, out / path.name, params, surface, namespace)
         for path in progress(paths, 'segmenting bags', len(paths))
     }
 

@@ -311,16 +311,13 @@ def _slide(
     for topic, _, value in messages[first:last]:
         streams[topic].append(value)
     heard = streams.pop(EXPLORATION)
-    began = [now.stamp_ns for was, now in pairwise([None, *heard]) if _begins(was, now)]
+    phases = [None, *(state.phase for state in heard)]
+    began = [now.stamp_ns for was, now in zip(phases, heard, strict=False) if now.phase is Phase.SLIDE is not was]
     # A hundred small batches a second take ten times the memory of their samples, and most of the time of the cutter.
     signals = {topic: join_batches(batches, began) for topic, batches in streams.items()}
     return LabelledSlide(
         path, states[0].exploration_id, surface, 0, start_ns, stop_ns, namespace, motion_made(states), signals, heard
     )
-
-
-def _begins(was: ExplorationState | None, now: ExplorationState) -> bool:
-    return now.phase is Phase.SLIDE and (was is None or was.phase is not Phase.SLIDE)
 
 
 def number_slides(slides: Sequence[LabelledSlide]) -> list[LabelledSlide]:

@@ -12,7 +12,7 @@ from itertools import takewhile
 from pathlib import Path
 
 from texture_core.cli import Command, add_bag_namespace, add_dask, add_seed, add_slides, core_count
-from texture_core.config import refuse_inputs, shipped, write_json
+from texture_core.config import check_outputs, shipped, write_json
 from texture_core.errors import InvalidParameter
 from texture_estimation.model import both_files, load_model
 from texture_estimation.recipe import load_recipe
@@ -38,7 +38,7 @@ def _configure_evaluate(parser: argparse.ArgumentParser) -> None:
 
 def _evaluate(options: argparse.Namespace) -> int:
     """Evaluate, print the figures, and write them with --json."""
-    refuse_inputs([options.json], [*both_files(options.model), *options.bags])
+    check_outputs([options.json], [*both_files(options.model), *options.bags])
     model = load_model(options.model)
     report = evaluate(model, options.bags, options.slides, options.namespace)
     print('\n'.join(summary(report)))
@@ -79,7 +79,7 @@ def _cross_validate(options: argparse.Namespace) -> int:
     split = parse_split(options.split, options.seed)
     names, bags = recipes_and_bags([options.recipe, *options.bags])
     # Files that cannot be written or would be lost are refused before hours of training, not after them.
-    refuse_inputs([options.json, options.chart], [*names, *bags])
+    check_outputs([options.json, options.chart], [*names, *bags])
     if options.chart:
         refuse_chart_format(options.chart)
     recipes = [load_recipe(name) for name in names]

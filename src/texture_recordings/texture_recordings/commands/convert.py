@@ -77,7 +77,8 @@ def _configure_segment(parser: argparse.ArgumentParser) -> None:
 def _segment(options: argparse.Namespace) -> int:
     """Write the copies, and name them with the number of their slides."""
     params = parameters_from(options, SegmentationParams)
-    for path, slides in segment_bags(options.bags, options.out, params, options.surface, options.namespace).items():
+    found = segment_bags(options.bags, Path(options.out), params, options.surface, options.namespace)
+    for path, slides in found.items():
         print(f'{path}: {slides} slides')
     return 0
 

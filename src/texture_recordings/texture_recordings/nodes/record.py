@@ -8,6 +8,7 @@ import queue
 import threading
 import time
 from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,7 +26,6 @@ from texture_recordings.ros import TOPICS, message_class
 QUEUE = 20_000  # a minute of one finger: a disk that stalls longer loses messages, and they are counted
 POLL_S = 0.2
 FLUSH_S = 1.0  # what a killed recorder, a failing supply or a full disk may take
-NOTHING = RawMessage('', '', 0, b'')
 DISCOVERY_S = 0.5  # period of the search for other topics
 
 
@@ -126,9 +126,11 @@ class RecordNode(Node):
     def _write(self) -> None:
         """Write messages from the queue to the disk until stopped."""
         flushed_s = time.monotonic()
-        while (message := self._next()) is not None:
+        while True:
             try:
-                if message is not NOTHING:
+                with suppress(queue.Empty):
+                    if (message := self._queue.get(timeout=FLUSH_S)) is None:
+                        return
                     self._bag.write_raw(message)
                     self._counts['messages'] += 1
                     self._note(message)
@@ -137,12 +139,6 @@ class RecordNode(Node):
                     self._bag.flush()
             except OSError as error:  # noqa: PERF203 - what comes later may fit
                 self._error = self._error or error
-
-    def _next(self) -> RawMessage | None:
-        try:
-            return self._queue.get(timeout=FLUSH_S)
-        except queue.Empty:
-            return NOTHING
 
     def _note(self, message: RawMessage) -> None:
         """Count lost samples, and bring an exploration that is over to the disk."""
