@@ -104,7 +104,7 @@ def test_slides_of_two_rates_are_refused_with_the_first_that_differs() -> None:
         for each in samples
     )
     slides = SlideDataset((*one.slides, replace(other.slides[0], number=2, bag=Path('fast'))))
-    with pytest.raises(ModelMismatch, match=r"'oak/2' in 'fast' has signal=2000Hz\*1, .* signal=1000Hz\*1"):
+    with pytest.raises(ModelMismatch, match=r"'oak/2' in 'fast' has signal=2000Hz\*1 of .* signal=1000Hz\*1"):
         slides.features(RECIPE.feature_set)
 
 
