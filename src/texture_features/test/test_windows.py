@@ -156,6 +156,31 @@ def test_a_stream_that_begins_late_or_again_costs_only_its_windows():
     assert late[-1].skipped == 4
 
 
+@pytest.mark.parametrize('missing', [0, 20])  # batches at the end of the first: its slide waits for them
+@pytest.mark.parametrize('begin_s', [-3.0, 0.5, 2.2, 3.1])
+def test_a_recording_whose_time_goes_back_behind_another_has_the_windows_that_it_has_alone(begin_s, missing):
+    def slides(*times_s):
+        for at_s in times_s:
+            yield state(at_s, name=f'e{at_s}', steady_s=0.8)
+            yield state(at_s + 0.8, Phase.DONE, name=f'e{at_s}')
+
+    first = stream(4.0)[: 800 - missing], [*slides(1.0, 3.2)]
+    # Numbered from the start, as another sensor, or on, as rows of one table.
+    for on in (0, 10_000):
+        batches = [
+            dataclasses.replace(one, first_sample=one.first_sample + on, samples=one.samples + 10_000)
+            for one in stream(3.0, begin_s=begin_s)
+        ]
+        second = batches, [*slides(begin_s + 0.1, begin_s + 1.5)]
+        cutter, events = WindowCutter(PARAMS, ['signal']), []
+        for signals, states in (first, second):
+            for item in sorted([*signals, *states], key=lambda one: one.stamp_ns):
+                (cutter.add_state if isinstance(item, ExplorationState) else partial(cutter.add_signal, 'signal'))(item)
+                events += cutter.take()
+        alone = [as_data(run({'signal': signals}, states)) for signals, states in (first, second)]
+        assert as_data(events + cutter.finish()) == [*alone[0], *alone[1]]
+
+
 @pytest.mark.parametrize('steady_s', [3600.0, 1e9])  # no guarantee holds for longer than an hour
 @pytest.mark.parametrize(('begin_s', 'windows'), [(3599.0, 6), (0.0, 6), (7200.0, 0)])
 def test_an_hour_without_samples_is_passed_over_at_once_and_counted(begin_s, windows, steady_s, monkeypatch):

@@ -294,14 +294,20 @@ class SampleBuffer:
         self.append(signal)
 
     @property
+    def newest_ns(self) -> int:
+        """When the newest batch began."""
+        return self._marks[-1][1]
+
+    @property
     def end_ns(self) -> int:
         """When the newest batch ended."""
         return self._marks[-1][2]
 
     def continued_by(self, signal: TactileSignal) -> bool:
-        """Whether the batch carries on this numbering, with or without a loss before it."""
+        """Whether the batch carries on this numbering and its time, with or without a loss before it."""
         return (
             signal.first_sample >= self.next_sample
+            and signal.stamp_ns >= self.newest_ns
             and signal.sampling_rate_hz == self.rate_hz
             and signal.channels == self.channels
         )
@@ -371,15 +377,20 @@ class BufferedStream:
         self.anchors: dict[SampleBuffer, tuple[int, int]] = {}
         self._keep_s = keep_s
 
-    def add(self, signal: TactileSignal) -> None:
-        """Add a batch."""
+    def add(self, signal: TactileSignal) -> bool:
+        """Add a batch; return whether its time goes back, as in a replay of the next bag: what came before is gone."""
         while len(self.buffers) > 1 and signal.stamp_ns - self.buffers[0].end_ns > self._keep_s * NANOSECONDS:
             self.buffers.popleft()
         if self.buffers and self.buffers[-1].continued_by(signal):
             self.lost_samples += self.buffers[-1].append(signal)
-            return
+            return False
+        back = bool(self.buffers) and signal.stamp_ns < self.buffers[-1].newest_ns
         self.restarts += bool(self.buffers)
+        if back:
+            self.buffers.clear()
+            self.anchors.clear()
         self.buffers.append(SampleBuffer(signal, self._keep_s))
+        return back
 
 
 # --------------------
@@ -427,6 +438,7 @@ class SlideCoverage:
         self.motion = state.motion
         self.start_ns = state.stamp_ns
         self.ended = False
+        self.given_up = False  # its samples will not come: the recording of it is over
         self.skipped = 0
         self._length_ns = length_ns
         self._hop_ns = hop_ns
@@ -628,7 +640,9 @@ class WindowCutter:
         source = self._inputs.get(topic)
         if source is None or not len(signal.samples):
             return
-        source.add(signal)
+        if source.add(signal):
+            for slide in self._slides:
+                slide.given_up |= slide.ended or slide.start_ns > signal.end_ns
         source.received = self._ready = True
 
     def add_state(self, state: ExplorationState) -> None:
@@ -704,7 +718,7 @@ class WindowCutter:
     def _cut(self, slide: SlideCoverage, events: list[WindowEvent]) -> bool:
         """Cut what can be cut of a slide; return whether it is used up."""
         while span := slide.window():
-            found = self._find(slide, span)
+            found = ALL if slide.given_up else self._find(slide, span)
             if found == 0:
                 return False
             if isinstance(found, int):
@@ -729,7 +743,7 @@ class WindowCutter:
             if event is not None:
                 self._windows += 1
                 events.append(event)
-        return slide.ended
+        return slide.ended or slide.given_up
 
     def _find(self, slide: SlideCoverage, span: CoveredSpan) -> dict[str, Window] | int:
         """Return a window, or how many from this one on are lost; 0 if samples have not come yet."""
