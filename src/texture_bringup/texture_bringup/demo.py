@@ -257,7 +257,7 @@ def _explore(operator: Operator) -> list[Slide]:
         slides.append(slide_over(operator, replace(usual, **changes), title, expected))
         line(f'{"✓" if slides[-1].as_expected else "✗"} {title:<28}{slides[-1].outcome}')
 
-    section('Trained surfaces: a slide ends as soon as the evidence is enough')
+    section('Trained surfaces: a slide ends as soon as the evidence is enough (roughness 1 is smooth)')
     for surface in RECOGNISED:
         slide(surface, surface, ACCEPTED)
     section('Surfaces that were never trained')
@@ -313,7 +313,8 @@ def draw(slides: Sequence[Slide], path: Path) -> None:
             axis.text(
                 0.0,
                 0.5,
-                'green: accepted\norange: rejected\ngrey: the other surfaces\n\ndotted: before the\nfirst estimate',
+                'green: accepted\norange: rejected\ngrey: other surfaces\ndotted: before the\nfirst estimate\n\n'
+                'Probabilities are among\ntrained surfaces; novel:\nfar from all of them',
                 transform=axis.transAxes,
                 va='center',
             )
