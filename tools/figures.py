@@ -88,6 +88,7 @@ def stale(root: Path, digests: Mapping[str, Callable[[], Mapping[str, str]]]) ->
         path = root / 'docs' / 'charts' / f'{name}.json'
         if not path.exists():
             continue
+        print(f'checking {path.relative_to(root)}', flush=True)  # each takes seconds
         stored, today = numbers(path).get('digests', {}), now()
         changed = [row for row in {**stored, **today} if stored.get(row) != today.get(row)]
         command = f'texture experiment {name.removesuffix("-tuned")}{" --tune" if name.endswith("-tuned") else ""}'

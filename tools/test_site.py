@@ -14,7 +14,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +23,7 @@ import reference
 
 from texture_bringup.command import installed
 from texture_core.config import parameters_of
+from texture_core.errors import ExplorationError, MotionRefused
 from texture_core.types import ExplorationRequest
 from texture_drivers.catalogue import SENSORS
 from texture_drivers.sensor import SensorParams
@@ -183,8 +184,28 @@ def test_the_motion_of_the_page_slides_along_its_bows(examples: Path) -> None:
     exploration.run(pace)
     assert exploration.outcome.success
     slid = [place for state, place in zip(states, places, strict=True) if state.phase.value == 'slide']
-    assert max(y for _, y, _ in slid) == pytest.approx(0.01, abs=0.001)
-    assert min(y for _, y, _ in slid) == pytest.approx(-0.01, abs=0.001)
+    assert max(y for _, y, _ in slid) == pytest.approx(0.02, abs=0.001)
+    assert min(y for _, y, _ in slid) == pytest.approx(-0.02, abs=0.001)
+
+
+@pytest.mark.parametrize(
+    ('numbers', 'field', 'allowed'),
+    [
+        ({'speed_m_s': 0.25, 'radius_m': 0.01}, 'speed_m_s', '0.224'),  # the root of 5 m/s² times the radius
+        ({'radius_m': 0.06}, 'radius_m', '0.050'),
+        # Three half circles of 0.04 m in 0.15 m; the ramps of 0.1 s and the steady 0.05 s take 0.008 m.
+        ({'distance_m': 0.2}, 'distance_m', '0.181'),
+    ],
+)
+def test_the_motion_of_the_page_refuses_with_the_field_and_what_is_allowed(
+    examples: Path, numbers: Mapping[str, float], field: str, allowed: str
+) -> None:
+    snake, limits = importlib.import_module('my_textures.snake').snake, SafetyLimits(x_high_m=0.15, y_low_m=-0.05)
+    with pytest.raises(MotionRefused, match=rf'allowed is at most {allowed} m') as refused:
+        snake(ExplorationRequest('snake', **numbers), (0.0, 0.0, 0.01), TouchParams(), limits)
+    assert refused.value.field == field
+    outside = field != 'speed_m_s'
+    assert refused.value.error == (ExplorationError.OUTSIDE_WORKSPACE if outside else ExplorationError.INVALID_REQUEST)
 
 
 def test_the_feature_of_the_page_counts_the_crossings_of_a_tone(examples: Path) -> None:

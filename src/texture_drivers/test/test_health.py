@@ -13,7 +13,7 @@ import pytest
 from texture_core.errors import DeviceError, InvalidData
 from texture_core.types import TactileSignal
 from texture_drivers import sensor as sensor_reader
-from texture_drivers.health import ChannelWatch, SensorHealth, Tare, TareParams, saturated
+from texture_drivers.health import Baseline, ChannelWatch, SensorHealth, Tare, TareParams, saturated
 from texture_drivers.sensor import SensorReader
 
 DEADLINE_S = 10.0
@@ -208,6 +208,12 @@ def test_a_tare_gives_level_and_noise_of_each_channel() -> None:
     assert stream.sent / RATE_HZ == pytest.approx(20.0, abs=0.11)
     np.testing.assert_allclose(found.level, LEVEL, atol=0.5)
     np.testing.assert_allclose(found.noise, NOISE, rtol=0.1)
+
+
+def test_drift_counts_in_noise_at_least_the_median_of_the_channels_and_a_ten_thousandth_of_the_level() -> None:
+    noise, level = np.array([1.0, 2.0, 1.0, 0.0, 0.0]), np.array([100.0, 100.0, 0.0, 100.0, 200_000.0])
+    drift = Baseline(level, noise, 0, Stream().batch()).drift(level + np.array([6.0, -6.0, 6.0, 6.0, 6.0]))
+    np.testing.assert_allclose(drift, [6.0, 3.0, 6.0, 6.0, 0.3])
 
 
 def test_a_level_that_moves_refuses_the_tare_and_names_the_channels() -> None:

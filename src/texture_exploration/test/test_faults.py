@@ -3,7 +3,9 @@
 """Faults of a robot in the middle of a slide: reported in time and in a sentence, and the next exploration works."""
 
 import functools
+import os
 import re
+import signal
 import time
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
@@ -63,6 +65,10 @@ def nothing(_device):
     pass
 
 
+def sent(number):
+    return lambda controller: os.kill(controller.pid, number)
+
+
 def hold(motors):
     return lambda bus: setattr(bus.motors, 'held', motors)
 
@@ -74,7 +80,7 @@ SILENCE_S = 0.5
 LOST = 'lost|not answered|ended'
 FAULTS = {
     'ur freezes': (
-        ur, 'rtde_control', ControllerProcess.freeze, ControllerProcess.resume, 'not answered', SILENCE_S + 0.02,
+        ur, 'rtde_control', sent(signal.SIGSTOP), sent(signal.SIGCONT), 'not answered', SILENCE_S + 0.02,
     ),
     'ur dies': (ur, 'rtde_control', ControllerProcess.stop, ControllerProcess.start, LOST, SILENCE_S + 0.02),
     'ur stops protectively': (

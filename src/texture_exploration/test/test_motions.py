@@ -30,6 +30,20 @@ def test_every_motion_says_which_numbers_it_takes():
     assert not unlisted, f'{sorted(unlisted)}: list each motion in both MOTIONS and DEFAULTS of motions.py'
 
 
+@pytest.mark.parametrize('name', MOTIONS)
+def test_a_motion_that_leaves_the_workspace_is_refused_with_what_is_allowed(name):
+    tight = SafetyLimits(x_low_m=-0.001, x_high_m=0.001, y_low_m=-0.001, y_high_m=0.001)
+    with pytest.raises(MotionRefused) as refused:
+        MOTIONS[name](ExplorationRequest(name), (0.0, 0.0, 0.01), TouchParams(), tight)
+    parts = {
+        "its error, 'OUTSIDE_WORKSPACE'": refused.value.error == ExplorationError.OUTSIDE_WORKSPACE,
+        'the field, one of its DEFAULTS': refused.value.field in DEFAULTS[name],
+        'what is allowed': 'allowed' in str(refused.value),
+    }
+    lacking = ' and '.join(part for part, there in parts.items() if not there)
+    assert not lacking, f"the refusal of {name} beyond the workspace, '{refused.value}', lacks {lacking}"
+
+
 @pytest.mark.parametrize(('name', 'number'), [(name, number) for name in DEFAULTS for number in DEFAULTS[name]])
 def test_each_number_that_a_motion_takes_changes_what_the_finger_does(make_table, name, number):
     def pressed(**numbers):
@@ -66,6 +80,8 @@ def test_no_motion_exceeds_an_acceleration_along_or_sideways_at_its_highest_spee
         with contextlib.suppress(MotionRefused):
             assert table.explore(ExplorationRequest(name, speed_m_s=speed_m_s, **numbers)).success
             break
+    else:
+        pytest.fail(f'{name} refuses every speed with {numbers}: a quarter of its DEFAULTS must be within RANGES, too')
     along, sideways = [], []
     points = [(state.stamp_ns * 1e-9, complex(x, y)) for state, (x, y, _) in sliding(table)]
     for (begin_s, a), (middle_s, b), (end_s, c) in zip(points, points[1:], points[2:], strict=False):
@@ -170,7 +186,9 @@ def test_what_cannot_be_done_is_refused_with_what_can_and_names_the_field(motion
         MOTIONS[motion](ExplorationRequest(motion, **numbers), (0.0, 0.0, 0.01), TouchParams(), limits)
     assert sentence in str(refused.value)
     assert refused.value.error == error
-    assert refused.value.field in numbers
+    assert refused.value.field in numbers, (
+        f'the refusal of {motion} names no field of the request: give MotionRefused one'
+    )
 
 
 def test_a_default_beyond_a_limit_is_the_limit():

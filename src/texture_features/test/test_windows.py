@@ -107,6 +107,12 @@ def test_a_turn_leaves_a_hole_but_keeps_what_was_guaranteed():
     assert starts(run({'signal': stream(3.0)}, states)) == [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 1.1]
 
 
+@pytest.mark.parametrize(('later_s', 'first'), [(0.5, 0), (0.501, 6)])
+def test_two_states_cover_the_time_between_them_up_to_half_a_second(later_s, first):
+    states = [state(0.0, steady_s=0.1), state(later_s, steady_s=1.0), state(later_s + 1.0, Phase.LIFT)]
+    assert starts(run({'signal': stream(3.0)}, states)) == [number / 10 for number in range(first, 11)]
+
+
 def test_a_window_comes_with_its_last_sample_and_not_before():
     cutter = WindowCutter(PARAMS, ['signal'])
     cutter.add_state(state(0.0, steady_s=2.0))

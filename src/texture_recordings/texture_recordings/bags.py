@@ -148,7 +148,7 @@ class CheckedPath(type(Path())):  # type: ignore[misc]
         logging.getLogger(__name__).warning("'%s' was cut off; it has nothing behind its last whole chunk", self)
         return cast('IO[Any]', _Ended(file, end))
 
-    def read_text(self, encoding: str | None = None, errors: str | None = None) -> str:
+    def read_text(self, encoding: str | None = None) -> str:
         """Return the text of a short file."""
         return read_text(self, MAX_METADATA_BYTES, encoding or 'utf-8')
 

@@ -122,11 +122,11 @@ class SimulatedStream(NamedTuple):
 class SensorKind(NamedTuple):
     """A simulated sensor, and the emulated device through which it sends live."""
 
-    make: Callable[..., SensorModel]
-    device: Callable[[Path, np.random.Generator], devices.EmulatedDevice]
-    path_rate_hz: float
-    step_points: int
-    streams: tuple[SimulatedStream, ...]
+    make: Callable[..., SensorModel]  # from the arguments of `SensorModel`
+    device: Callable[[Path, np.random.Generator], devices.EmulatedDevice]  # from its link
+    path_rate_hz: float  # points of the path a second, as the model takes them
+    step_points: int  # points of a frame or sample: the device is given multiples of these
+    streams: tuple[SimulatedStream, ...]  # what the driver publishes; the fast one first
 
     @property
     def fast(self) -> SimulatedStream:

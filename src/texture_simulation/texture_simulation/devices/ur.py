@@ -13,7 +13,6 @@ import math
 import os
 import re
 import select
-import signal
 import socket
 import struct
 import subprocess
@@ -795,14 +794,6 @@ class ControllerProcess:
         """Number of the process."""
         assert self._process is not None
         return self._process.pid
-
-    def freeze(self) -> None:
-        """Let it hang."""
-        os.kill(self.pid, signal.SIGSTOP)
-
-    def resume(self) -> None:
-        """Resume it."""
-        os.kill(self.pid, signal.SIGCONT)
 
     def stop(self) -> None:
         """Kill it; may be called twice."""
