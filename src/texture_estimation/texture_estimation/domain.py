@@ -23,6 +23,9 @@ from texture_features.windows import Interval
 ODD_FRACTION = 0.01
 
 
+MEAN_TOLERANCE = 1e-6  # relative: running means are rounded
+
+
 def joint_interval(trained: Interval | None, added: Interval | None) -> Interval | None:
     """Return the range of the training with that of added slides; None if the training knew none."""
     if trained is None or added is None:
@@ -45,7 +48,8 @@ def is_beyond(value: float, interval: Interval | None, margin: float) -> bool:
     if interval is None or math.isnan(value):
         return False
     low, high = interval
-    return not low / (1.0 + margin) <= value <= high * (1.0 + margin)
+    within = (1.0 + margin) * (1.0 + MEAN_TOLERANCE)
+    return not low / within <= value <= high * within
 
 
 # --------------------
