@@ -21,8 +21,6 @@ from texture_features.windows import Interval
 
 # Of the slides, at either end of a range: with a hundred slides or more, one odd slide does not widen it.
 ODD_FRACTION = 0.01
-
-
 MEAN_TOLERANCE = 1e-6  # relative: running means are rounded
 
 

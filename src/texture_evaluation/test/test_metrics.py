@@ -64,7 +64,7 @@ def test_slides_over_untrained_surfaces_that_end_early_and_accepted_are_counted(
     assert (figures['n_unknown'], figures['unknown_ended_early'], figures['unknown_accepted']) == (4, 0.25, 0.5)
     ends = 'accepted at the end 50.0 %, with early stopping ended early and accepted 25.0 %'
     assert f'of the 4 slides over other surfaces: {ends}; slides rejected at the end: 2 novel' in lines
-    assert 'as soon as decided: never decided over trained surfaces' in lines
+    assert 'as soon as decided: none over trained surfaces' in lines
     none = EvaluationReport(('a', 'b'), [slide('a', 'aaa')], [], np.ones(4))
     assert (none.as_json()['unknown_ended_early'], none.as_json()['unknown_accepted']) == (None, None)
 

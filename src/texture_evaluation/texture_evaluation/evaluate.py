@@ -296,7 +296,7 @@ def summary(report: EvaluationReport) -> list[str]:
         ),
         f'as soon as decided: accuracy {percent(early["accuracy"])}, after {early["mean_s"]:.2f} s on average'
         if metrics.ended_early(report.known)
-        else f'as soon as decided: never decided{" over trained surfaces" if figures["unknown_ended_early"] else ""}',
+        else f'as soon as decided: {"none over trained surfaces" if figures["unknown_ended_early"] else "never decided"}',
         f'processor time of a window: {latency["median"]:.0f} µs median, {latency["p99"]:.0f} µs 99th percentile',
     ]
     if report.known:
