@@ -83,7 +83,7 @@ def test_an_accuracy_is_shown_from_five_slides_of_each_surface_on(
     training = {**model.training, 'held_out_window_accuracy': 0.5}  # that of chance
     few = replace(model, training=training, acceptance=replace(model.acceptance, domain=domain))
     lines = summary(few, Path('model.npz'))
-    why = 'as the fewest slides of a surface are 4; record 5 or more of each'
+    why = 'as a surface has 4 of the 5 slides that each needs; record more'
     assert lines[1].endswith(f'; no accuracy can be measured, {why}') != shown
     assert ('; 50.0 % accuracy of held-out windows' in lines[1]) == shown
     assert any('is not above chance' in line for line in lines) == shown

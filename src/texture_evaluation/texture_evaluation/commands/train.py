@@ -68,8 +68,8 @@ def summary(model: TextureModel, out: Path) -> list[str]:
     accuracy, slides = training['held_out_window_accuracy'], model.acceptance.domain.slides
     held_out, fewest = 'nothing was held out', min(slides.values(), default=0)
     if accuracy is not None and fewest < LEAST_SLIDES_A_LABEL:
-        few = f'the fewest slides of a surface are {fewest}'
-        held_out = f'no accuracy can be measured, as {few}; record {LEAST_SLIDES_A_LABEL} or more of each'
+        needed = f'{fewest} of the {LEAST_SLIDES_A_LABEL} slides that each needs'
+        held_out = f'no accuracy can be measured, as a surface has {needed}; record more'
     elif accuracy is not None:
         held_out = f'{100 * accuracy:.1f} % accuracy of held-out windows'
     kinds = len(model.next_touch_model.motions) if model.next_touch_model else 0
