@@ -280,6 +280,7 @@ def summary(report: EvaluationReport) -> list[str]:
         if fraction is not None
     ]
     early, latency = figures['early'], figures['latency_us']
+    undecided = 'none over trained surfaces' if figures['unknown_ended_early'] else 'never decided'
     lines = [
         f'slides: {len(report.known)} over trained surfaces, {len(report.unknown)} over others',
         f'training and test, by the names of the bags: {report.shift}',
@@ -296,7 +297,7 @@ def summary(report: EvaluationReport) -> list[str]:
         ),
         f'as soon as decided: accuracy {percent(early["accuracy"])}, after {early["mean_s"]:.2f} s on average'
         if metrics.ended_early(report.known)
-        else f'as soon as decided: {"none over trained surfaces" if figures["unknown_ended_early"] else "never decided"}',
+        else f'as soon as decided: {undecided}',
         f'processor time of a window: {latency["median"]:.0f} µs median, {latency["p99"]:.0f} µs 99th percentile',
     ]
     if report.known:
