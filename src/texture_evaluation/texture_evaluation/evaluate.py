@@ -307,10 +307,10 @@ def summary(report: EvaluationReport) -> list[str]:
             lines.append(f'{of}, {when}: {", ".join(shown)}')
         lines.append(by_reason(figures['rejections']))
     if report.unknown:
-        accepted, early = percent(figures['unknown_accepted']), percent(figures['unknown_ended_early'])
+        accepted, ended = percent(figures['unknown_accepted']), percent(figures['unknown_ended_early'])
         lines.append(
             f'of the {len(report.unknown)} slides over other surfaces: accepted at the end {accepted}, with early '
-            f'stopping ended early and accepted {early}; {by_reason(figures["rejections_of_untrained"])}'
+            f'stopping ended early and accepted {ended}; {by_reason(figures["rejections_of_untrained"])}'
         )
     if report.slides_in_training:
         lines.append(
