@@ -183,7 +183,7 @@ def test_the_models_are_good_and_the_figures_are_written(data, capsys, tmp_path)
         ('cross-validate folds:5 default glass', "no split 'folds'"),
         ('cross-validate leave-one-out:colour default glass', 'leave one of speed, force'),
         ('cross-validate stratified:2 default two-fingers glass leather', "has no '"),
-        ('cross-validate leave-one-out:speed default glass leather', "all are of one group, '0.05'"),
+        ('cross-validate leave-one-out:speed default glass leather', "all are of one speed, '0.05'; import or record"),
         ('train default glass leather -o fast', "'fast.npz' exists; give another name, or --force to replace it"),
         ('train default glass leather -o old', "slides were added to an earlier model, in 'old.added'; move them away"),
         ('train default glass leather -o no/x', "there is no folder 'no' for the model"),

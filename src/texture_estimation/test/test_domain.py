@@ -48,6 +48,21 @@ def test_a_range_is_wider_than_its_slides_by_the_margin(speed, within):
     assert (trained_on(conditions(0.05), speed_margin=0.15).deviation(conditions(speed)) == '') is within
 
 
+@pytest.mark.parametrize('most', [0.065, 0.05 / 1.3])
+def test_a_value_at_the_margin_stays_within_it_whatever_the_rounding_of_its_mean(most):
+    trained = trained_on(conditions(0.05, 0.05), speed_margin=0.3, force_margin=0.3)
+    trained = replace(trained, levels={'signal/moments/signal_log_power/x': (0.025, 0.025)})  # its margin is 1
+    level = ('signal/moments/signal_log_power/x', 0.05 if most > 0.05 else 0.0125)
+    for rounding in (-1e-9, 0.0, 1e-9):
+        near = 1.0 + rounding
+        slide = replace(conditions(most * near, most * near), levels=((level[0], level[1] * near),))
+        assert trained.deviation(slide) == ''
+    beyond = 1.0 + 1e-5 if most > 0.05 else 1.0 - 1e-5
+    slide = replace(conditions(most * beyond, most * beyond), levels=((level[0], level[1] * beyond),))
+    found = trained.deviation(slide)
+    assert [word in found for word in ('speed', 'force', 'level')] == [True] * 3
+
+
 def test_a_slide_widens_the_range_by_how_its_mean_settles_and_one_odd_slide_of_many_does_not():
     settling = SlideConditions(speed_m_s=0.05, speed_range_m_s=(0.02, 0.06))
     odd = SlideConditions(speed_m_s=0.05, speed_range_m_s=(0.001, 0.5))

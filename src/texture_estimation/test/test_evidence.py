@@ -139,12 +139,15 @@ def test_a_slide_without_windows_ends_with_a_reason(model, examples):
     )
 
 
+CHANNELS = "the number of channels of 'signal' is 2, that of the training 1; use a model of this sensor"
+
+
 @pytest.mark.parametrize(
     ('came', 'trained', 'words'),
     [
         ('a signal=1000Hz*1', 'a signal=1000Hz*1', ''),
         ('a signal=1000Hz*1', 'a signal=2200Hz*1', 'sampling rate'),
-        ('a signal=1000Hz*2', 'a signal=1000Hz*1', '2 channels'),
+        ('a signal=1000Hz*2', 'a signal=1000Hz*1', CHANNELS),
         ('a signal=1000Hz*1', 'a signal=1000Hz*1 signal_static=60Hz*12', 'signal, signal_static'),
         ('a signal=1000Hz*1', 'b signal=1000Hz*1', 'recipe'),
         ('', 'b signal=1000Hz*1', 'none'),

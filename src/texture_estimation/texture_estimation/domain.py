@@ -21,6 +21,7 @@ from texture_features.windows import Interval
 
 # Of the slides, at either end of a range: with a hundred slides or more, one odd slide does not widen it.
 ODD_FRACTION = 0.01
+MEAN_TOLERANCE = 1e-6  # relative: running means are rounded
 
 
 def joint_interval(trained: Interval | None, added: Interval | None) -> Interval | None:
@@ -45,7 +46,8 @@ def is_beyond(value: float, interval: Interval | None, margin: float) -> bool:
     if interval is None or math.isnan(value):
         return False
     low, high = interval
-    return not low / (1.0 + margin) <= value <= high * (1.0 + margin)
+    within = (1.0 + margin) * (1.0 + MEAN_TOLERANCE)
+    return not low / within <= value <= high * within
 
 
 # --------------------

@@ -162,8 +162,8 @@ def _without_arrays(tree: Any, place: str, arrays: dict[str, AnyArray]) -> Any:
 
 def read_tree(path: str | Path, *, of: str) -> dict[str, Any]:
     """Return the tree that `write_tree` was given; nothing in the files is run."""
-    arrays_path, card_path = both_files(path)
-    tree = _read_card(card_path, path)
+    arrays_path, _ = both_files(path)
+    tree = read_card(path)
     if of not in tree['recipe']:
         answers, node = KINDS[of]
         raise ModelMismatch(f"model '{model_stem(path)}' {answers}; load it in the {node}")
@@ -252,10 +252,16 @@ def replace_file(path: Path, content: bytes) -> None:
         temporary.unlink(missing_ok=True)
 
 
-def _read_card(path: Path, given: str | Path) -> dict[str, Any]:
+def read_card(given: str | Path) -> dict[str, Any]:
+    """Return what the card of a model holds."""
+    arrays, path = both_files(given)
     try:
         card = load_json(path, MAX_CARD_BYTES)
     except FileNotFoundError as error:
+        if arrays.is_file():
+            raise ModelMismatch(
+                f"there is no card '{path}' next to '{arrays}'; copy both files of the model"
+            ) from error
         missing = f"card '{path}' of '{given}'" if Path(given).exists() else f"model '{given}'"
         raise ModelMismatch(f'there is no {missing}; give the path of a trained model') from error
     except (OSError, ValueError) as error:

@@ -181,6 +181,7 @@ def test_answers_of_one_cluster_count_together() -> None:
     [
         (StratifiedGroupKFold(7), 'slide', "'cork' has 6 slides, too few for 7 folds"),
         (LeaveOneGroupOut(), 'force', 'the slides cannot be split'),
+        (LeaveOneGroupOut(), 'session', r'all are of one session, .*; import or record slides of a second session, '),
         ('stratified:3', 'slide', r"the splitter is 'stratified:3'; give one of scikit-learn"),
         (LeaveOneGroupOut(), np.zeros(3), 'groups have the shape'),
         (

@@ -52,9 +52,21 @@ def test_a_decision_is_early_when_it_is_certain_of_a_known_surface() -> None:
     assert metrics.early_decision([never_sure]) == {'accuracy': 0.0, 'mean_s': pytest.approx(0.8)}
 
 
-def test_unknown_surfaces_count_as_accepted_if_the_last_estimate_takes_them_for_known() -> None:
-    assert metrics.unknown_accepted([slide('x', 'a'), slide('y', 'a', known=False)]) == 0.5
-    assert metrics.unknown_accepted([]) is None
+def test_slides_over_untrained_surfaces_that_end_early_and_accepted_are_counted() -> None:
+    unknown = [
+        slide('x', 'aaa', decided_from=1),  # ends early, accepted
+        slide('x', 'aaa'),  # accepted at its end
+        slide('y', 'aaa', decided_from=0, known=False),
+        slide('y', 'aaa', known=False),
+    ]
+    report = EvaluationReport(('a', 'b'), [slide('a', 'aaa')], unknown, np.ones(4))
+    figures, lines = report.as_json(), summary(report)
+    assert (figures['n_unknown'], figures['unknown_ended_early'], figures['unknown_accepted']) == (4, 0.25, 0.5)
+    ends = 'accepted at the end 50.0 %, with early stopping ended early and accepted 25.0 %'
+    assert f'of the 4 slides over other surfaces: {ends}; slides rejected at the end: 2 novel' in lines
+    assert 'as soon as decided: none over trained surfaces' in lines
+    none = EvaluationReport(('a', 'b'), [slide('a', 'aaa')], [], np.ones(4))
+    assert (none.as_json()['unknown_ended_early'], none.as_json()['unknown_accepted']) == (None, None)
 
 
 def test_rows_of_the_confusion_table_are_the_true_surfaces() -> None:
@@ -110,7 +122,9 @@ def test_each_line_names_the_slides_that_it_counts() -> None:
     ends = 'accuracy 75.0 %, accepted and correct 50.0 %, accepted but wrong 25.0 %, rejected 25.0 %'
     assert f'{of}, at the end: {ends}' in lines
     assert f'{of}, once decided: accepted but wrong 0.0 %, rejected 25.0 %' in lines
-    assert 'of the 4 slides over other surfaces: accepted 0.0 %; slides rejected at the end: 4 novel' in lines
+    early = 'with early stopping ended early and accepted 0.0 %'
+    ends = f'accepted at the end 0.0 %, {early}; slides rejected at the end: 4 novel'
+    assert f'of the 4 slides over other surfaces: {ends}' in lines
     assert lines[-1].startswith('1 slides are not counted, as each window ')
     assert lines[-1].endswith(': x/1')
 
@@ -123,6 +137,6 @@ def test_both_lists_of_labels_are_named_where_no_tested_surface_was_trained() ->
     report = EvaluationReport(('a', 'b'), [], slides, np.ones(2), too_little_training=few)
     lines = summary(report)
     assert 'no tested surface was trained, so there is no accuracy: trained are a, b; tested are cork, felt' in lines
-    assert 'of the 2 slides over other surfaces: accepted 50.0 %; slides rejected at the end: 1 novel' in lines
+    assert any(line.startswith('of the 2 slides over other surfaces: accepted at the end 50.0 %') for line in lines)
     assert lines[-1] == report.as_json()['too_little_training'] == few
     assert (report.as_json()['tested'], report.as_json()['rejections_of_untrained']) == (['cork', 'felt'], {'novel': 1})

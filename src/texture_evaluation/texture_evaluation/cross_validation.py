@@ -541,8 +541,10 @@ def split_slides(
     if type(splitter).__name__.startswith('Stratified'):
         _check_folds(labels, getattr(splitter, 'n_splits', 1))
     if isinstance(splitter, LeaveOneGroupOut) and len(np.unique(columns)) < 2:
+        what = groups if isinstance(groups, str) else 'group'
         raise InvalidData(
-            f"the slides cannot be split: all are of one group, '{columns[0]}'; use another split or record more slides"
+            f"the slides cannot be split: all are of one {what}, '{columns[0]}'; import or record slides of a second "
+            f'{what}, or use the split stratified:5'
         )
     try:
         splits = list(splitter.split(np.zeros((len(labels), 1)), labels, columns))
@@ -660,7 +662,7 @@ def cross_validate(
         print(result.as_json()['window_accuracy'])
     """
     columns = slide_groups(dataset, groups)
-    splits = split_slides(dataset, splitter, columns)
+    splits = split_slides(dataset, splitter, groups)
     requested = {row for _, test in splits for row in test.tolist()}
     splits = of_trained_surfaces(dataset.labels, splits)
     untested = requested - {row for _, test in splits for row in test.tolist()}

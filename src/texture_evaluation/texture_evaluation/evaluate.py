@@ -69,7 +69,9 @@ class EvaluationReport:
             **figures(self.known, self.clusters),
             'early': metrics.early_decision(self.known) if self.known else nothing,
             'calibration_error': metrics.calibration_error(self.known),
-            'unknown_accepted': metrics.unknown_accepted(self.unknown),
+            'n_unknown': len(self.unknown),
+            'unknown_accepted': metrics.accepted_wrong(self.unknown)['final'],
+            'unknown_ended_early': metrics.ended_early(self.unknown),
             'labels': list(self.labels),
             'tested': self.tested,
             'confusion': self.confusion.tolist(),
@@ -278,6 +280,7 @@ def summary(report: EvaluationReport) -> list[str]:
         if fraction is not None
     ]
     early, latency = figures['early'], figures['latency_us']
+    undecided = 'none over trained surfaces' if figures['unknown_ended_early'] else 'never decided'
     lines = [
         f'slides: {len(report.known)} over trained surfaces, {len(report.unknown)} over others',
         f'training and test, by the names of the bags: {report.shift}',
@@ -293,8 +296,8 @@ def summary(report: EvaluationReport) -> list[str]:
             ]
         ),
         f'as soon as decided: accuracy {percent(early["accuracy"])}, after {early["mean_s"]:.2f} s on average'
-        if any(estimate.decided and estimate.accepted for result in report.known for estimate in result.estimates)
-        else 'as soon as decided: never decided',
+        if metrics.ended_early(report.known)
+        else f'as soon as decided: {undecided}',
         f'processor time of a window: {latency["median"]:.0f} µs median, {latency["p99"]:.0f} µs 99th percentile',
     ]
     if report.known:
@@ -304,8 +307,11 @@ def summary(report: EvaluationReport) -> list[str]:
             lines.append(f'{of}, {when}: {", ".join(shown)}')
         lines.append(by_reason(figures['rejections']))
     if report.unknown:
-        accepted, rejected = percent(figures['unknown_accepted']), by_reason(figures['rejections_of_untrained'])
-        lines.append(f'of the {len(report.unknown)} slides over other surfaces: accepted {accepted}; {rejected}')
+        accepted, ended = percent(figures['unknown_accepted']), percent(figures['unknown_ended_early'])
+        lines.append(
+            f'of the {len(report.unknown)} slides over other surfaces: accepted at the end {accepted}, with early '
+            f'stopping ended early and accepted {ended}; {by_reason(figures["rejections_of_untrained"])}'
+        )
     if report.slides_in_training:
         lines.append(
             f'{len(report.slides_in_training)} of {len(report.known)} slides were in the training, so these figures '

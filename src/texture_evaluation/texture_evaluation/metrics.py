@@ -92,9 +92,9 @@ def calibration_error(results: Sequence[SlideResult]) -> float:
     return float(np.abs(gaps).sum() / len(right))
 
 
-def unknown_accepted(results: Sequence[SlideResult]) -> float | None:
-    """Return the fraction of slides over surfaces without training that were accepted; None without any."""
-    return _fraction([result.end.accepted for result in results])
+def ended_early(results: Sequence[SlideResult]) -> float | None:
+    """Return the fraction of slides that end early, accepted, where early stopping is on; None without slides."""
+    return _fraction([early.decided and early.accepted for early in map(SlideResult.early, results)])
 
 
 def accepted_wrong(results: Sequence[SlideResult]) -> Mapping[str, float | None]:

@@ -10,7 +10,9 @@ import pytest
 from table_arm import Shape, TableArmParams
 
 from texture_core.types import NANOSECONDS, ExplorationRequest, Phase, TactileSignal
+from texture_exploration.arms.arm import ArmState
 from texture_exploration.touch import TouchParams
+from texture_exploration.watches import ContactLost, ContactWatch
 from texture_features.windows import CutWindow, WindowParams, cut_recording
 
 REQUEST = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.15)
@@ -41,6 +43,16 @@ def least_touching(table):
     stamps, forces = map(np.array, zip(*table.pressed, strict=True))
     windows = windows_from(table, lambda times: forces[np.searchsorted(stamps, times).clip(max=len(stamps) - 1)] > 0)
     return min(window.windows['signal'].samples.mean() for window in windows), len(windows)
+
+
+@pytest.mark.parametrize(('force_n', 'touching'), [(0.51, True), (0.49, False), (0.05, False), (math.nan, False)])
+def test_contact_is_lost_below_a_quarter_of_the_wanted_force(force_n, touching):
+    watch = ContactWatch(2.0, TouchParams())
+    watch.update(ArmState(1, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), force_n))
+    assert watch.touching == touching
+    if not touching:
+        with pytest.raises(ContactLost, match=r'lost for 100 ms: the force is \S+ N of 2 N'):
+            watch.update(ArmState(100_000_001, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), force_n))
 
 
 @pytest.mark.parametrize('shape', [DROP, Shape(edge_m=EDGE_IN_SLIDE_M)], ids=['a drop', 'an edge'])

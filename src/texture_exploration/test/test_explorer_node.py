@@ -296,7 +296,8 @@ def test_a_request_may_name_a_motion_of_another_package_if_the_parameters_do(mak
 
 
 def cork(state, **values):
-    known = {'label': 'cork', 'rejection': Rejection.NONE, 'confidence': 0.99, 'decided': True, 'windows': 5}
+    known = {'label': 'cork', 'rejection': Rejection.NONE, 'confidence': 0.99, 'decided': True, 'windows': 1}
+    known['evidence_s'] = 0.5
     return TextureEstimate(to_ns(state.header.stamp), state.exploration_id, **{**known, **values})
 
 
@@ -304,7 +305,7 @@ def test_a_decided_texture_ends_the_slide_early(world):
     world.estimate(lambda state: cork(state, final=phase_of(state) in ('lift', 'done')))
     response = world.explored(**SLOW, early_stopping=True)
     assert response.error_code == OK
-    assert response.message == "ended early: 'cork' is decided with 0.99 after 5 windows"
+    assert response.message == "ended early: 'cork' is decided with 0.99 after 0.5 s of evidence"
     assert (response.texture.label, response.texture.final) == ('cork', True)
     assert max(state.progress for state in world.states if phase_of(state) == 'slide') < 0.5
 

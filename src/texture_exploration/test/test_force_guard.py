@@ -4,6 +4,7 @@
 
 import pytest
 
+from texture_core.types import Phase
 from texture_exploration.arms.arm import ArmCommand, ArmState
 from texture_exploration.guards import ForceGuard
 from texture_exploration.safety import SafetyLimits
@@ -43,3 +44,24 @@ def test_the_way_back_is_as_long_as_it_helps(before_n, after_n, steps_back):
 def test_the_way_back_is_as_fast_as_the_way_there_within_bounds(there_m_s, back_m_s):
     [command] = answers([0.0] * 10, [11.0], ArmCommand(normal_m_s=-there_m_s))
     assert command.normal_m_s == pytest.approx(back_m_s)
+
+
+# With friction up to twice the normal force and 1 N beyond it: under 3 N up to 7 N, in free air up to 1 N.
+@pytest.mark.parametrize(
+    ('along_n', 'normal_n', 'violated'),
+    [
+        ((6.99, 0.0), 3.0, False),
+        ((7.01, 0.0), 3.0, True),
+        ((0.0, -7.01), 3.0, True),
+        ((4.96, -4.96), 3.0, True),  # 7.01 N
+        ((7.01, 0.0), -3.0, True),  # it pulls
+        ((0.99, 0.0), 0.0, False),
+        ((1.01, 0.0), 0.0, True),
+    ],
+)
+def test_a_force_along_the_surface_beyond_friction_is_a_violation_except_in_the_lift(along_n, normal_n, violated):
+    guard = ForceGuard(SafetyLimits(force_limit_n=10.0, friction_limit=2.0, tangential_floor_n=1.0))
+    arm = ArmState(1, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), normal_n, along_n=along_n)
+    for phase in (Phase.APPROACH, Phase.CONTACT, Phase.SLIDE):
+        assert guard.violation(arm, phase).startswith('the force along the surface of ') == violated
+    assert guard.violation(arm, Phase.LIFT) == ''

@@ -488,6 +488,7 @@ def _layout(inputs: Sequence[Window]) -> InputLayout:
 # --------------------
 # Report in which part two fingerprints of feature sets differ.
 
+ONE_RATE = "record all at one rate; a driver that measures it has 'rate_hz'"
 PART = re.compile(r'(?P<topic>[^=\s]+)=(?P<rate>[^=*\s]+)Hz\*(?P<channels>\d+)')
 
 
@@ -502,11 +503,14 @@ def fingerprint_difference(came: str, trained: str) -> str:
         trained_rate, trained_channels = wanted[topic]
         if rate != trained_rate:
             return (
-                f"the sampling rate of '{topic}' is {rate} Hz, the model was trained at {trained_rate} Hz; where a "
-                "driver measures the rate, set 'rate_hz'"
+                f"the sampling rate of '{topic}' is {rate} Hz, the model was trained at {trained_rate} Hz; use a model "
+                f'trained at this rate, or {ONE_RATE}'
             )
         if channels != trained_channels:
-            return f"'{topic}' has {channels} channels, the model was trained on {trained_channels}"
+            return (
+                f"the number of channels of '{topic}' is {channels}, that of the training {trained_channels}; use a "
+                'model of this sensor'
+            )
     if came.partition(CORRECTED)[0] == trained.partition(CORRECTED)[0]:
         return (
             'the correction of the finger differs; start the feature_extractor and the classifier again, both with '
@@ -730,8 +734,8 @@ class LabelledFeatures:
         fingerprints = sorted({vector.feature_set for vector in used})
         if len(fingerprints) > 1:
             raise ModelMismatch(
-                f'the windows are described in different ways: {"; ".join(fingerprints)}; use those of one kind, '
-                "and where a driver measures the rate, set 'rate_hz'"
+                f'the windows are described in different ways: {"; ".join(fingerprints)}; use those of one kind; '
+                f'if only the rates differ, {ONE_RATE}'
             )
         running: defaultdict[str, RunningConditions] = defaultdict(RunningConditions)
         for vector in used:

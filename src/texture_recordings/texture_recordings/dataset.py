@@ -25,7 +25,7 @@ from texture_core.types import (
     TactileSignal,
     Window,
 )
-from texture_features.feature_set import LabelledFeatures
+from texture_features.feature_set import ONE_RATE, LabelledFeatures
 from texture_features.windows import CutWindow, WindowEvent, cut_recording
 from texture_recordings.bags import is_bag, short_name, topics_in
 from texture_recordings.slides import (
@@ -420,8 +420,8 @@ class SlideDataset:
             if len(set(kinds)) > 1:
                 raise ModelMismatch(
                     f"slide '{slide.name}' in '{slide.bag}' has {kinds[1]} of the sensor '{both[1].sensor}', and those "
-                    f"before it {kinds[0]} of '{both[0].sensor}' (rate × channels); use slides of one kind, and where "
-                    "a driver measures the rate, set 'rate_hz'"
+                    f"before it {kinds[0]} of '{both[0].sensor}' (rate × channels); use slides of one kind; if "
+                    f'only the rates differ, {ONE_RATE}'
                 )
             vectors += described
             resized += feature_set.extract_many(_windows_over(slide, feature_set, distances_m))

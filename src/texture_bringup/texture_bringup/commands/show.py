@@ -126,16 +126,11 @@ def _info(options: argparse.Namespace) -> int:
 
 
 def _model_lines(path: Path) -> list[str]:
-    from texture_core.config import load_card
-    from texture_core.errors import InvalidData
-    from texture_estimation.model import both_files, load_model
+    from texture_estimation.model import load_model, read_card
     from texture_estimation.roughness import load_roughness_model
     from texture_evaluation.commands.train import graded_summary, summary
 
-    _, card = both_files(path)
-    if not card.is_file():
-        raise InvalidData(f"there is no card '{card}' of the model; copy both of its files")
-    if 'regressor' in load_card(card):
+    if 'regressor' in read_card(path)['recipe']:
         graded = load_roughness_model(path)
         return [f'roughness model {graded.name}', *graded_summary(graded, path)[:-1]]
     model = load_model(path)

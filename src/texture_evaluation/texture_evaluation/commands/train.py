@@ -66,9 +66,12 @@ def summary(model: TextureModel, out: Path) -> list[str]:
     """Return the labels of a model and its held-out accuracy, in lines."""
     training = model.training
     accuracy, slides = training['held_out_window_accuracy'], model.acceptance.domain.slides
-    held_out = 'nothing was held out' if accuracy is None else f'{100 * accuracy:.1f} % accuracy of held-out windows'
-    if accuracy is not None and min(slides.values(), default=0) < LEAST_SLIDES_A_LABEL:
-        held_out = f'for an accuracy {LEAST_SLIDES_A_LABEL} slides of each surface are needed'
+    held_out, fewest = 'nothing was held out', min(slides.values(), default=0)
+    if accuracy is not None and fewest < LEAST_SLIDES_A_LABEL:
+        needed = f'{fewest} of the {LEAST_SLIDES_A_LABEL} slides that each needs'
+        held_out = f'no accuracy can be measured, as a surface has {needed}; record more'
+    elif accuracy is not None:
+        held_out = f'{100 * accuracy:.1f} % accuracy of held-out windows'
     kinds = len(model.next_touch_model.motions) if model.next_touch_model else 0
     return [
         f"recipe '{model.recipe.name}' trained on {len(model.labels)} surfaces: {', '.join(model.labels)}",
@@ -92,7 +95,8 @@ def _unfit(model: TextureModel) -> list[str]:
     chance = 1.0 / max(labels, 1)
     margin = 1.64 * (chance * (1.0 - chance) / max(training['slides'], 1)) ** 0.5
     accuracy = training['held_out_window_accuracy']
-    if accuracy is not None and labels > 1 and accuracy <= chance + margin:
+    enough = min(model.acceptance.domain.slides.values(), default=0) >= LEAST_SLIDES_A_LABEL
+    if enough and accuracy is not None and labels > 1 and accuracy <= chance + margin:
         warnings.append(
             f'warning: {100 * accuracy:.1f} % accuracy of held-out windows is not above chance, {100 * chance:.1f} % '
             f'of {labels} surfaces; use a recipe for this sensor and rate, or check the labels'

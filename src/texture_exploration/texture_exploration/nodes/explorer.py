@@ -409,7 +409,7 @@ class ExplorerNode(PatientLifecycleNode):
         if isinstance(estimate, TextureEstimate) and may_stop(estimate):
             current.finish(
                 f"ended early: '{estimate.label}' is decided with {estimate.confidence:.2f} "
-                f'after {estimate.windows} windows'
+                f'after {estimate.evidence_s:.1f} s of evidence'
             )
 
     def _on_state(self, state: ExplorationState) -> None:
