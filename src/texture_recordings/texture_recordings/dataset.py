@@ -410,20 +410,21 @@ class SlideDataset:
             from texture_features.augmentation import Augmenter  # noqa: PLC0415  # needs scipy
 
             augmenter = Augmenter(feature_set, augmentation)
+        # One kind of signal, before anything is computed.
+        kinds = [(slide, kind) for slide in self.slides if (kind := signal_kind(slide.signals, feature_set.topics))]
+        for slide, kind in kinds:
+            first, usual = kinds[0]
+            if kind != usual:
+                raise ModelMismatch(
+                    f"slide '{slide.name}' in '{slide.bag}' has {kind} of the sensor '{slide.sensor}', and those "
+                    f"before it {usual} of '{first.sensor}' (rate × channels); use slides of one kind, and where a "
+                    "driver measures the rate, set 'rate_hz'"
+                )
         # One pass over the slides: windows, copies, and windows of other lengths.
         vectors: list[FeatureVector] = []
         resized: list[FeatureVector] = []
         for slide, events in self.windows(feature_set):
-            described = _described(slide, feature_set, events)
-            both = (*vectors[:1], *described[:1])
-            kinds = [one.feature_set.partition(' ')[2] for one in both]
-            if len(set(kinds)) > 1:
-                raise ModelMismatch(
-                    f"slide '{slide.name}' in '{slide.bag}' has {kinds[1]} of the sensor '{both[1].sensor}', and those "
-                    f"before it {kinds[0]} of '{both[0].sensor}' (rate × channels); use slides of one kind, and where "
-                    "a driver measures the rate, set 'rate_hz'"
-                )
-            vectors += described
+            vectors += _described(slide, feature_set, events)
             resized += feature_set.extract_many(_windows_over(slide, feature_set, distances_m))
             if augmenter is not None:
                 augmenter.add(slide.name, events, slide.signals, slide.states)
@@ -491,6 +492,14 @@ class SlideDataset:
             If a slide has no samples of the topic or lost some.
         """
         return [slide.samples for slide in self.samples(topic)], self.labels
+
+
+def signal_kind(signals: Mapping[str, Sequence[TactileSignal]], topics: Sequence[str]) -> str:
+    """Return rate and channels of the signals of a slide, such as 'signal=2200Hz*1'; '' if it lacks a topic."""
+    if not all(map(signals.get, topics)):
+        return ''
+    first = {topic: signals[topic][0] for topic in topics}
+    return ' '.join(f'{topic}={one.sampling_rate_hz:.6g}Hz*{len(one.channels)}' for topic, one in first.items())
 
 
 def cut_slide(slide: LabelledSlide, feature_set: FeatureSet) -> list[WindowEvent]:

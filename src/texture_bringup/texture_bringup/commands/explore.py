@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import argparse
+import fcntl
 import json
 import logging
 import math
@@ -34,6 +35,7 @@ from texture_core.errors import (
     InvalidData,
     InvalidParameter,
     LaunchFailed,
+    ModelMismatch,
     MotionAborted,
     MotionRefused,
     TextureError,
@@ -292,7 +294,6 @@ def collect_surface(
     A bag without any slide is removed; then None is returned instead.
     """
     from texture_evaluation import collection
-    from texture_recordings.bags import is_bag
 
     low_x, high_x, low_y, high_y, low_n, high_n, high_m_s = operator.parameters('explorer', (*PATCH, *LIMITS))
     if not (low_x < high_x and low_y < high_y):
@@ -302,16 +303,13 @@ def collect_surface(
         )
     patch = collection.Patch(low_x, high_x, low_y, high_y)
     plan = collection.PlacePlan(surface, params, patch, (low_n, high_n), (LEAST_SPEED_M_S, high_m_s))
-    if any(map(is_bag, folder.iterdir())):
-        try:
-            _features_of(folder)  # what cannot be used is refused before the robot moves
-        except TextureError as error:
-            raise InvalidData(f"{error}; or move that bag out of '{folder}'") from error
+    before = sensors_in(folder)
     bag = collection.next_bag(folder, surface)
     made, losses = 0, ''
     end = collection.CollectionEnd(CollectionError.CANCELLED, 'stopped', 0)  # by Ctrl-C while the recorder starts
     try:
         with suppress(KeyboardInterrupt), recorder(operator, bag, namespace) as recording:
+            refuse_other_sensor(bag, namespace, before)
             stopped = operator.watch_stops()
 
             def keep(exploration_id: str) -> None:
@@ -343,7 +341,7 @@ def collect_surface(
             end = collection.collect(plan, params, explore, evaluate, _print_progress)
             if recording.end and end.error is not CollectionError.NOT_RECORDED:  # in the last evaluation, say
                 end = replace(end, error=CollectionError.NOT_RECORDED, message=f'{recording.end}; {end.message}')
-    except LaunchFailed:  # the recorder was not discovered
+    except (LaunchFailed, ModelMismatch):  # the recorder was not discovered, or another sensor is
         _remove(bag)
         raise
     end = replace(end, message=f'{end.message}; {losses}; {GAPS}' if losses else end.message, slides=made)
@@ -372,6 +370,42 @@ def _features_of(folder: Path) -> LabelledFeatures:
 
     feature_set = FeatureSet.load(RECIPE)
     return SlideDataset.from_bags([folder], topics=feature_set.topics).features(feature_set)
+
+
+def sensors_in(folder: Path) -> dict[tuple[str, str], Path]:
+    """Return sensors in a folder, with rate and channels, and a bag of each; refuse what training could not use."""
+    from texture_features.feature_set import FeatureSet
+    from texture_recordings.bags import is_bag
+    from texture_recordings.dataset import SlideDataset, signal_kind
+
+    if not any(map(is_bag, folder.iterdir())):
+        return {}
+    feature_set = FeatureSet.load(RECIPE)
+    try:
+        dataset = SlideDataset.from_bags([folder], topics=feature_set.topics)
+        dataset.features(feature_set)
+    except TextureError as error:
+        raise InvalidData(f"{error}; or move that bag out of '{folder}'") from error
+    return {(slide.sensor, signal_kind(slide.signals, feature_set.topics)): slide.bag for slide in dataset}
+
+
+def refuse_other_sensor(bag: Path, namespace: str, before: Mapping[tuple[str, str], Path]) -> None:
+    """Raise ModelMismatch if a bag that is being recorded is of another sensor than one of those before it."""
+    from texture_features.feature_set import FeatureSet
+    from texture_recordings.bags import read_bag
+    from texture_recordings.dataset import signal_kind
+
+    topics = FeatureSet.load(RECIPE).topics
+    live = {topic: [batch] for topic, _, batch in read_bag(bag, topics, namespace)} if before else {}
+    if not (kind := signal_kind(live, topics)):
+        return  # what training needs does not come, and it will say so
+    sensor = live[topics[0]][0].sensor
+    for (other, of_other), there in before.items():
+        if (other, of_other) != (sensor, kind):
+            raise ModelMismatch(
+                f"'{there}' is of the sensor '{other}' with {of_other} (rate × channels), this one is '{sensor}' with "
+                f'{kind}; name another folder'
+            )
 
 
 class RecorderProcess(Child):
@@ -458,6 +492,23 @@ def _configure_collect(parser: argparse.ArgumentParser) -> None:
     add_namespace(parser)
 
 
+@contextmanager
+def claimed(folder: Path) -> Iterator[None]:
+    """Lock a folder against a second collection, whose bag would be read before it is complete; a kill unlocks it."""
+    lock = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):  # a file system may have no locks
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise InvalidParameter(
+                    f"another `texture collect` records into '{folder}' now; wait for its end, or name another folder"
+                ) from None
+        yield
+    finally:
+        os.close(lock)
+
+
 def _collect(options: argparse.Namespace) -> int:
     """Collect, and report how well left-out places are recognised; return 0 if the bound is met, else 1."""
     from texture_evaluation.collection import CollectionParams, next_bag
@@ -469,13 +520,14 @@ def _collect(options: argparse.Namespace) -> int:
     except OSError as error:
         reason = 'it is a file' if folder.is_file() else error.strerror
         raise InvalidParameter(f"'{folder}' cannot be the folder of the bags: {reason}; name another") from error
-    try:
-        with Operator(options.namespace) as operator:
-            operator.wait_for_explorer(EXPLORER_S, SOON_S)
-            end, bag = collect_surface(operator, options.surface, folder, params, options.namespace)
-    finally:
-        with suppress(OSError):  # bags are in it
-            folder.rmdir()
+    with claimed(folder):
+        try:
+            with Operator(options.namespace) as operator:
+                operator.wait_for_explorer(EXPLORER_S, SOON_S)
+                end, bag = collect_surface(operator, options.surface, folder, params, options.namespace)
+        finally:
+            with suppress(OSError):  # bags are in it
+                folder.rmdir()
     kept = f"; {end.slides} slide{'s' * (end.slides != 1)} in '{bag}'" if bag else ''
     if end.error not in (CollectionError.NONE, CollectionError.BOUND_MISSED):
         following = next_bag(folder, options.surface)
