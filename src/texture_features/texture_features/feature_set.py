@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texture_core.config import find, find_file, from_mapping, load_card, load_yaml, param, safe_repr, shipped
-from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch, UnknownName
+from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch, UnknownName, counted
 from texture_core.types import NANOSECONDS, AnyArray, Array, FeatureVector, SlideMotion, Window
 from texture_features.correction import CORRECTED, Correction, read_correction
 from texture_features.features import spectral, taxels, temporal
@@ -506,7 +506,7 @@ def fingerprint_difference(came: str, trained: str) -> str:
                 "driver measures the rate, set 'rate_hz'"
             )
         if channels != trained_channels:
-            return f"'{topic}' has {channels} channels, the model was trained on {trained_channels}"
+            return f"'{topic}' has {counted(int(channels), 'channel')}, the model was trained on {trained_channels}"
     if came.partition(CORRECTED)[0] == trained.partition(CORRECTED)[0]:
         return (
             'the correction of the finger differs; start the feature_extractor and the classifier again, both with '

@@ -39,6 +39,7 @@ from texture_core.errors import (
     MotionAborted,
     MotionRefused,
     TextureError,
+    counted,
 )
 from texture_core.types import ExplorationRequest, ExplorationState, TextureEstimate
 from texture_exploration.motions import MOTIONS
@@ -265,7 +266,7 @@ def _identify(options: argparse.Namespace) -> int:
             likely = np.argsort(-belief, kind='stable')[:SHOWN]
             print(f'  {", ".join(f"{known.textures[k]} {np.exp(belief[k]):.2f}" for k in likely)}')
     best = int(belief.argmax())
-    found = f'{known.textures[best]}, probability {np.exp(belief[best]):.2f} after {number} slides'
+    found = f'{known.textures[best]}, probability {np.exp(belief[best]):.2f} after {counted(number, "slide")}'
     if np.exp(belief[best]) < options.sure:
         found = f'undecided, --sure {options.sure:g} is not reached (nearest: {found})'
     print(f'texture: {found}')
@@ -360,7 +361,7 @@ def _remove(bag: Path) -> None:
 
 
 def _print_progress(sentence: str, slides: int) -> None:
-    print(f'{slides} slide{"s" * (slides != 1)}: {sentence}', flush=True)
+    print(f'{counted(slides, "slide")}: {sentence}', flush=True)
 
 
 def _features_of(folder: Path) -> LabelledFeatures:
@@ -528,7 +529,7 @@ def _collect(options: argparse.Namespace) -> int:
         finally:
             with suppress(OSError):  # bags are in it
                 folder.rmdir()
-    kept = f"; {end.slides} slide{'s' * (end.slides != 1)} in '{bag}'" if bag else ''
+    kept = f"; {counted(end.slides, 'slide')} in '{bag}'" if bag else ''
     if end.error not in (CollectionError.NONE, CollectionError.BOUND_MISSED):
         following = next_bag(folder, options.surface)
         kept += f"; continue at other places with --seed {params.seed + 1}, into '{following}'"

@@ -144,6 +144,7 @@ def _model_lines(path: Path) -> list[str]:
 
 def _bag_rows(bag: Path, namespace: str | None) -> Iterator[Row]:
     """Yield number of messages by topic, length, sensors, and the slides over each surface of a bag."""
+    from texture_core.errors import counted
     from texture_core.types import ExplorationState, Phase, TactileSignal
     from texture_recordings.bags import read_bag
 
@@ -160,7 +161,7 @@ def _bag_rows(bag: Path, namespace: str | None) -> Iterator[Row]:
             ends[value.exploration_id] = value.surface, value.phase
     yield '  length', f'{(last_ns - first_ns) / NANOSECONDS:.1f} s'
     for topic, count in sorted(counts.items()):
-        yield f'  {topic}', f'{count} messages{f" of {sensors[topic]}" if topic in sensors else ""}'
+        yield f'  {topic}', f'{counted(count, "message")}{f" of {sensors[topic]}" if topic in sensors else ""}'
     for surface in sorted({surface for surface, _ in ends.values()}):
         phases = Counter(phase.value for name, phase in ends.values() if name == surface)
         yield f'  {surface or "(no surface)"}', ', '.join(f'{count} {phase}' for phase, count in phases.items())
