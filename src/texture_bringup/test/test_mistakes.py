@@ -5,6 +5,8 @@
 import os
 import re
 import shutil
+import subprocess
+import sys
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -238,6 +240,12 @@ def test_what_is_missing_or_mistyped_is_named(command, sentence, data, capsys, m
     monkeypatch.chdir(data)
     monkeypatch.delenv('TEXTURE_DATA', raising=False)
     assert sentence in refused(command.split(), capsys)
+
+
+def test_nodes_and_the_check_of_names_need_no_library_of_the_training() -> None:
+    modules = 'texture_estimation.nodes.classifier, texture_features.nodes.feature_extractor, texture_evaluation.commands'
+    look = f"import sys, {modules}.train; print({{'scipy.stats', 'scipy.signal', 'sklearn'}} & set(sys.modules))"
+    assert subprocess.run([sys.executable, '-c', look], capture_output=True, text=True, check=True).stdout == 'set()\n'
 
 
 def test_a_pattern_that_takes_the_number_of_a_file_for_a_label_is_named(tmp_path, capsys) -> None:

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import trim_mean
 
 from texture_core.config import load_json, write_json
 from texture_core.errors import InvalidData, ModelMismatch, counted
@@ -80,6 +79,8 @@ class InputStatistics:
                 f'{np.median(rest_rms):.3g}: too little signal; see that the finger touches the plate, or slide faster '
                 'or harder'
             )
+        from scipy.stats import trim_mean  # noqa: PLC0415  # takes 0.5 s, and every node imports this module
+
         starts = np.arange(0, len(samples) - length + 1, length // 2)
         segments = np.stack([samples[start : start + length] for start in starts])
         segments = (segments - segments.mean(axis=1, keepdims=True)) * np.hanning(length)[:, None]
