@@ -227,6 +227,9 @@ def test_the_models_are_good_and_the_figures_are_written(data, capsys, tmp_path)
         ('launch emulator model:=pipe', "there is no card 'pipe.json' of 'pipe'"),
         ('launch replay', 'give bag:=VALUE'),
         ('launch replay bag:=nowhere', "there is no bag 'nowhere'"),
+        ('launch replay bag:=glass slides:=1000', "has slides '1000'; there are 1 to 3"),
+        ('launch emulator dashboard:=maybe', "argument 'dashboard' is 'maybe'; true, false, 1 or 0 is needed"),
+        ('launch ur emulated:=false ip:=x', 'auto finds the only TSF-85); give device:=VALUE'),
         ('replay glass --rate nan', "parameter 'rate' is nan; allowed is 0.01 to 1000.0"),
         ('list sensor', "did you mean 'sensors'?"),
         ('info nowhere', "there is no bag 'nowhere'"),
@@ -243,7 +246,9 @@ def test_what_is_missing_or_mistyped_is_named(command, sentence, data, capsys, m
 
 
 def test_nodes_and_the_check_of_names_need_no_library_of_the_training() -> None:
-    modules = 'texture_estimation.nodes.classifier, texture_features.nodes.feature_extractor, texture_evaluation.commands'
+    modules = (
+        'texture_estimation.nodes.classifier, texture_features.nodes.feature_extractor, texture_evaluation.commands'
+    )
     look = f"import sys, {modules}.train; print({{'scipy.stats', 'scipy.signal', 'sklearn'}} & set(sys.modules))"
     assert subprocess.run([sys.executable, '-c', look], capture_output=True, text=True, check=True).stdout == 'set()\n'
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 import argparse
 import fcntl
 import os
-import re
 import signal
 import sys
 import time
@@ -26,6 +25,7 @@ from typing import Any
 
 from texture_bringup.launcher import (
     EXPLORER,
+    VARIABLE,
     NodeDescription,
     Supervisor,
     find_launch_file,
@@ -78,7 +78,14 @@ LOADED: Mapping[str, Callable[[Any], Any]] = {
     ),
     'feature_extractor': lambda given: _call('texture_features.feature_set:FeatureSet.load', given.recipe),
     'adaptor': lambda given: _call('texture_drivers.adaptor:load_mapping', given.mapping, given.finger),
-    'replay': lambda given: given.bag and _call('texture_recordings.bags:bags_in', given.bag),
+    'replay': lambda given: (
+        given.bag
+        and (
+            _call('texture_recordings.slides:find_slides', [given.bag], given.slides, given.from_namespace or None)
+            if given.slides
+            else _call('texture_recordings.bags:bags_in', given.bag)
+        )
+    ),
     'sensor': lambda given: _call('texture_drivers.catalogue:make_sensor', given, time.time_ns),
 }
 OF_ROS = {'use_sim_time', 'start_type_description_service'}  # parameters of every node
@@ -193,7 +200,7 @@ def _settings(node: NodeDescription, nodes: Sequence[NodeDescription]) -> Simple
 
 def _argument(node: NodeDescription, name: str) -> str:
     """Return where a launch file has the value of a parameter: its argument, or the node."""
-    found = re.findall(r'\$\(var (\w+)\)', node.origins.get(name, ''))
+    found = VARIABLE.findall(node.origins.get(name, ''))
     return f"launch argument '{found[0]}'" if found else 'launch file'
 
 
