@@ -153,7 +153,7 @@ DONE = ExplorationError.NONE, 'id'
 
 
 @pytest.mark.parametrize(
-    ('change', 'kind'), [({'sensor': 'other'}, "'other' with"), ({'sampling_rate_hz': 500.0}, '500Hz')]
+    ('change', 'kind'), [({'sensor': 'other'}, r"'other' \("), ({'sampling_rate_hz': 500.0}, '500 Hz, 1 channel')]
 )
 def test_a_folder_with_bags_of_another_sensor_is_refused_before_the_robot_moves(
     collected, two_surfaces: Path, tmp_path: Path, change, kind

@@ -55,6 +55,9 @@ def data(tmp_path_factory):
     assert main(['train', 'default', *bags, '-o', str(folder / 'fast')]) == 0
     assert main(['train', 'vibration-and-taxels', *bags, '-o', str(folder / 'all')]) == 0
     os.mkfifo(folder / 'pipe')
+    (folder / 'csv').mkdir()
+    (folder / 'csv' / 'cork.csv').write_text('acc\n' + '1\n2\n' * 500)
+    (folder / 'map.yaml').write_text('{label: {value: cork}, streams: {signal: {columns: [acc]}}}')
     (folder / 'mine.launch.py').write_text('from launch import LaunchDescription')
     for name, change in CHANGES.items():
         with BagWriter(folder / name) as bag:
@@ -233,6 +236,9 @@ def test_the_models_are_good_and_the_figures_are_written(data, capsys, tmp_path)
         ('replay glass --rate nan', "parameter 'rate' is nan; allowed is 0.01 to 1000.0"),
         ('list sensor', "did you mean 'sensors'?"),
         ('info nowhere', "there is no bag 'nowhere'"),
+        ('info map.yaml', "'map.yaml' is no bag (a folder, or an .mcap file) and no model (.npz with .json)"),
+        ('import table csv map.yaml out', "'csv' is a folder; give a mapping (YAML), and behind it the source"),
+        ('import table map.yaml csv out', "'signal' has no column of time and no rate; write time: {column: NAME}"),
         ('import tabel map.yaml . out', "did you mean 'table'?"),
         ('demo --recipe defualt', "did you mean 'default'?"),
         ('dashboard --port 99999', 'allowed is 0 to 65535'),

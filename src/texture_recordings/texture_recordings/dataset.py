@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -411,13 +412,19 @@ class SlideDataset:
 
             augmenter = Augmenter(feature_set, augmentation)
         # One kind of signal, before anything is computed.
-        kinds = [(slide, kind) for slide in self.slides if (kind := signal_kind(slide.signals, feature_set.topics))]
-        for slide, kind in kinds:
-            first, usual = kinds[0]
-            if kind != usual:
+        first = self.slides[0]
+        for topic, slide in itertools.product(feature_set.topics, self.slides):
+            here, usual = (
+                [
+                    f'{topic}={batch.sampling_rate_hz:.6g}Hz*{len(batch.channels)}'
+                    for batch in one.signals.get(topic, ())[:1]
+                ]
+                for one in (slide, first)
+            )
+            if here and usual and here != usual:
                 raise ModelMismatch(
-                    f"slide '{slide.name}' in '{slide.bag}' has {kind} of the sensor '{slide.sensor}', and those "
-                    f"before it {usual} of '{first.sensor}' (rate × channels); use slides of one kind, and where a "
+                    f"slide '{slide.name}' in '{slide.bag}' has {here[0]} of the sensor '{slide.sensor}', and those "
+                    f"before it {usual[0]} of '{first.sensor}' (rate × channels); use slides of one kind, and where a "
                     "driver measures the rate, set 'rate_hz'"
                 )
         # One pass over the slides: windows, copies, and windows of other lengths.
@@ -492,14 +499,6 @@ class SlideDataset:
             If a slide has no samples of the topic or lost some.
         """
         return [slide.samples for slide in self.samples(topic)], self.labels
-
-
-def signal_kind(signals: Mapping[str, Sequence[TactileSignal]], topics: Sequence[str]) -> str:
-    """Return rate and channels of the signals of a slide, such as 'signal=2200Hz*1'; '' if it lacks a topic."""
-    if not all(map(signals.get, topics)):
-        return ''
-    first = {topic: signals[topic][0] for topic in topics}
-    return ' '.join(f'{topic}={one.sampling_rate_hz:.6g}Hz*{len(one.channels)}' for topic, one in first.items())
 
 
 def cut_slide(slide: LabelledSlide, feature_set: FeatureSet) -> list[WindowEvent]:

@@ -547,6 +547,8 @@ class FrameSlides:
                     f"the times of '{name}' do not grow from row to row; give a column of time that grows and has "
                     'enough digits, or `rate_hz` in its place'
                 )
+        elif not (measured or params.rate_hz):
+            raise InvalidData(f"'{name}' has no column of time and no rate; write time: {{column: NAME}}, or `rate_hz`")
         # Of the first file: windows of all are to have as many samples.
         rate_hz = self._report.rates_hz.get(name) or params.rate_hz or measured
         if measured and not 1 / SAME_RATE <= measured / rate_hz <= SAME_RATE:

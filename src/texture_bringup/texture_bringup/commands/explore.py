@@ -15,7 +15,7 @@ import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, replace
 from functools import partial
@@ -41,7 +41,7 @@ from texture_core.errors import (
     TextureError,
     counted,
 )
-from texture_core.types import ExplorationRequest, ExplorationState, TextureEstimate
+from texture_core.types import ExplorationRequest, ExplorationState, Rejection, TextureEstimate
 from texture_exploration.motions import MOTIONS
 from texture_exploration.presets import load_preset
 
@@ -131,19 +131,23 @@ def _explore(options: argparse.Namespace) -> int:
     return code
 
 
-ACCEPTED, REJECTED, ABORTED = 0, 3, 4  # 1: fault of the program, 2: invalid input of the user
+ACCEPTED, REJECTED, ABORTED, NO_MODEL = 0, 3, 4, 5  # 1: fault of the program, 2: invalid input of the user
 
 
 def exit_code(result: ExplorationResult) -> int:
-    """Return what `explore` ends with: a label that may be used, none, an abort, or a refused request."""
+    """Return what `explore` ends with: a label that may be used, none, an abort, no fitting model, or a refusal."""
     if not result.exploration_id:
         return USER_ERROR
     if not result.success:
         return ABORTED
+    if result.texture.rejection is Rejection.NO_MODEL:
+        return NO_MODEL
     return ACCEPTED if result.texture.accepted else REJECTED
 
 
-OUTCOMES = {ACCEPTED: 'accepted', REJECTED: 'rejected', ABORTED: 'aborted', USER_ERROR: 'refused'}
+OUTCOMES = {
+    ACCEPTED: 'accepted', REJECTED: 'rejected', ABORTED: 'aborted', NO_MODEL: 'no model', USER_ERROR: 'refused'
+}  # fmt: skip
 
 
 def as_json(result: ExplorationResult) -> dict[str, Any]:
@@ -295,6 +299,7 @@ def collect_surface(
     A bag without any slide is removed; then None is returned instead.
     """
     from texture_evaluation import collection
+    from texture_recordings.bags import is_bag
 
     low_x, high_x, low_y, high_y, low_n, high_n, high_m_s = operator.parameters('explorer', (*PATCH, *LIMITS))
     if not (low_x < high_x and low_y < high_y):
@@ -304,13 +309,17 @@ def collect_surface(
         )
     patch = collection.Patch(low_x, high_x, low_y, high_y)
     plan = collection.PlacePlan(surface, params, patch, (low_n, high_n), (LEAST_SPEED_M_S, high_m_s))
-    before = sensors_in(folder)
+    if before := sorted(filter(is_bag, folder.iterdir())):
+        try:
+            _features_of(folder)  # what cannot be used is refused before the robot moves
+        except TextureError as error:
+            raise InvalidData(f"{error}; or move that bag out of '{folder}'") from error
     bag = collection.next_bag(folder, surface)
     made, losses = 0, ''
     end = collection.CollectionEnd(CollectionError.CANCELLED, 'stopped', 0)  # by Ctrl-C while the recorder starts
     try:
         with suppress(KeyboardInterrupt), recorder(operator, bag, namespace) as recording:
-            refuse_other_sensor(bag, namespace, before)
+            refuse_other_sensor(before, bag, namespace)
             stopped = operator.watch_stops()
 
             def keep(exploration_id: str) -> None:
@@ -373,40 +382,19 @@ def _features_of(folder: Path) -> LabelledFeatures:
     return SlideDataset.from_bags([folder], topics=feature_set.topics).features(feature_set)
 
 
-def sensors_in(folder: Path) -> dict[tuple[str, str], Path]:
-    """Return sensors in a folder, with rate and channels, and a bag of each; refuse what training could not use."""
-    from texture_features.feature_set import FeatureSet
-    from texture_recordings.bags import is_bag
-    from texture_recordings.dataset import SlideDataset, signal_kind
-
-    if not any(map(is_bag, folder.iterdir())):
-        return {}
-    feature_set = FeatureSet.load(RECIPE)
-    try:
-        dataset = SlideDataset.from_bags([folder], topics=feature_set.topics)
-        dataset.features(feature_set)
-    except TextureError as error:
-        raise InvalidData(f"{error}; or move that bag out of '{folder}'") from error
-    return {(slide.sensor, signal_kind(slide.signals, feature_set.topics)): slide.bag for slide in dataset}
-
-
-def refuse_other_sensor(bag: Path, namespace: str, before: Mapping[tuple[str, str], Path]) -> None:
-    """Raise ModelMismatch if a bag that is being recorded is of another sensor than one of those before it."""
-    from texture_features.feature_set import FeatureSet
+def refuse_other_sensor(bags: Sequence[Path], ours: Path, namespace: str) -> None:
+    """Raise ModelMismatch if bags are of another sensor, or rate or channels, than ours, which is being recorded."""
     from texture_recordings.bags import read_bag
-    from texture_recordings.dataset import signal_kind
 
-    topics = FeatureSet.load(RECIPE).topics
-    live = {topic: [batch] for topic, _, batch in read_bag(bag, topics, namespace)} if before else {}
-    if not (kind := signal_kind(live, topics)):
-        return  # what training needs does not come, and it will say so
-    sensor = live[topics[0]][0].sensor
-    for (other, of_other), there in before.items():
-        if (other, of_other) != (sensor, kind):
-            raise ModelMismatch(
-                f"'{there}' is of the sensor '{other}' with {of_other} (rate × channels), this one is '{sensor}' with "
-                f'{kind}; name another folder'
-            )
+    def sensor(bag: Path, within: str | None = None) -> str:
+        for _, _, batch in read_bag(bag, ('signal',), within):
+            channels = counted(len(batch.channels), 'channel')
+            return f"'{batch.sensor}' ({batch.sampling_rate_hz:.6g} Hz, {channels})"
+        return ''
+
+    for bag in bags:
+        if (there := sensor(bag)) != (came := sensor(ours, namespace)):
+            raise ModelMismatch(f"'{bag}' is of the sensor {there}, this one is {came}; name another folder")
 
 
 class RecorderProcess(Child):

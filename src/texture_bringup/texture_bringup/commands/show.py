@@ -111,6 +111,7 @@ def _configure_info(parser: argparse.ArgumentParser) -> None:
 
 
 def _info(options: argparse.Namespace) -> int:
+    from texture_core.errors import InvalidData
     from texture_recordings.bags import bags_in
 
     path = Path(options.path)
@@ -120,6 +121,8 @@ def _info(options: argparse.Namespace) -> int:
     if not path.is_dir() and (half or path.suffix in endings):
         print('\n'.join(_model_lines(path)))
         return 0
+    if path.is_file() and path.suffix != '.mcap':
+        raise InvalidData(f"'{path}' is no bag (a folder, or an .mcap file) and no model (.npz with .json); name one")
     for bag in bags_in(path):
         print(f'{bag}\n{table(_bag_rows(bag, options.namespace))}')
     return 0
