@@ -73,6 +73,11 @@ def test_a_texture_is_added_and_removed_from_the_command_line(graph, asked, caps
     assert classify_slide(graph, 'slide-3') != 'silk'
     assert asked(graph, 'add', 'oak') == 0
     assert asked(graph, 'add', '--undo') == 0
+    assert classify_slide(graph, 'slide-5')
+    assert asked(graph, 'add', 'corc') == 0
+    added = "added 'corc', a new texture (did you mean 'cork'? `texture add --undo` takes it back), from 'slide-5'"
+    assert added in capsys.readouterr().out
+    assert asked(graph, 'add', '--undo') == 0
     assert classify_slide(graph, 'slide-4') != 'oak'
 
 

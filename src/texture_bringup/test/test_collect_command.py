@@ -3,9 +3,11 @@
 """What a collection asks of the explorer, and which bag it leaves, without a robot."""
 
 import os
+import shutil
 import signal
 import time
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from unittest.mock import MagicMock, Mock
 
@@ -20,6 +22,7 @@ from texture_core.errors import (
     InvalidData,
     InvalidParameter,
     LaunchFailed,
+    ModelMismatch,
     TextureError,
 )
 from texture_core.types import RoughnessEstimate, TextureEstimate
@@ -61,15 +64,20 @@ class Explorer:
 def collected(monkeypatch, tmp_path):
     """Collect with an explorer, by a recorder that makes a bag, and may not start, end or lose samples."""
 
-    def collected(explorer, *, recorder_ends=False, start=None, losses='', ends_late='', wait_for=None, **params):
+    def collected(
+        explorer, *, recorder_ends=False, start=None, losses='', ends_late='', wait_for=None, record=None, **params
+    ):
         recording = Mock(end=ends_late)
         recording.check.side_effect = InvalidData('the recorder died with exit code 1') if recorder_ends else None
         recording.wait_for.side_effect = wait_for or (losses if isinstance(losses, list) else lambda _name: losses)
 
         @contextmanager
         def recorder(_operator, bag, _namespace):
-            bag.mkdir()
-            (bag / 'cork.mcap').touch()
+            if record:
+                record(bag)
+            else:
+                bag.mkdir()
+                (bag / 'cork.mcap').touch()
             if start:
                 raise start
             yield recording
@@ -142,6 +150,40 @@ def test_a_bag_in_the_folder_that_cannot_be_used_is_refused_before_the_robot_mov
 
 
 DONE = ExplorationError.NONE, 'id'
+
+
+@pytest.mark.parametrize(
+    ('change', 'kind'), [({'sensor': 'other'}, r"'other' \("), ({'sampling_rate_hz': 500.0}, '500 Hz, 1 channel')]
+)
+def test_a_folder_with_bags_of_another_sensor_is_refused_before_the_robot_moves(
+    collected, two_surfaces: Path, tmp_path: Path, change, kind
+) -> None:
+    [recorded, _] = sorted((two_surfaces / 'bags').iterdir())
+    shutil.copytree(recorded, tmp_path / 'glass')
+
+    def of_now(bag: Path) -> None:
+        writer = BagWriter(bag)
+        for name, time_ns, value in read_bag(recorded, ('signal', 'signal_static')):
+            writer.write(f'/{name}', replace(value, **change), time_ns)
+        writer.close()
+
+    explorer = Explorer(DONE)
+    with pytest.raises(
+        ModelMismatch, match=f"glass' is of the sensor '.*, this one is .*{kind}.*; name another folder"
+    ):
+        collected(explorer, record=of_now)
+    assert not explorer.requests
+    assert sorted(one.name for one in tmp_path.iterdir()) == ['glass']
+
+
+def test_a_second_collection_into_a_folder_is_refused_until_the_first_has_ended(tmp_path: Path, capsys) -> None:
+    with explore.claimed(tmp_path):
+        assert main(['collect', 'cork', str(tmp_path)]) == 2
+        said = capsys.readouterr().err
+        assert f"another `texture collect` records into '{tmp_path}' now; wait for its end, or name another" in said
+        assert tmp_path.is_dir()
+    with explore.claimed(tmp_path):
+        pass
 
 
 ENDED = 'the exploration has ended: the motion was completed'

@@ -5,6 +5,8 @@
 import os
 import re
 import shutil
+import subprocess
+import sys
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -53,6 +55,9 @@ def data(tmp_path_factory):
     assert main(['train', 'default', *bags, '-o', str(folder / 'fast')]) == 0
     assert main(['train', 'vibration-and-taxels', *bags, '-o', str(folder / 'all')]) == 0
     os.mkfifo(folder / 'pipe')
+    (folder / 'csv').mkdir()
+    (folder / 'csv' / 'cork.csv').write_text('acc\n' + '1\n2\n' * 500)
+    (folder / 'map.yaml').write_text('{label: {value: cork}, streams: {signal: {columns: [acc]}}}')
     (folder / 'mine.launch.py').write_text('from launch import LaunchDescription')
     for name, change in CHANGES.items():
         with BagWriter(folder / name) as bag:
@@ -225,9 +230,15 @@ def test_the_models_are_good_and_the_figures_are_written(data, capsys, tmp_path)
         ('launch emulator model:=pipe', "there is no card 'pipe.json' of 'pipe'"),
         ('launch replay', 'give bag:=VALUE'),
         ('launch replay bag:=nowhere', "there is no bag 'nowhere'"),
+        ('launch replay bag:=glass slides:=1000', "has slides '1000'; there are 1 to 3"),
+        ('launch emulator dashboard:=maybe', "argument 'dashboard' is 'maybe'; true, false, 1 or 0 is needed"),
+        ('launch ur emulated:=false ip:=x', 'auto finds the only TSF-85); give device:=VALUE'),
         ('replay glass --rate nan', "parameter 'rate' is nan; allowed is 0.01 to 1000.0"),
         ('list sensor', "did you mean 'sensors'?"),
         ('info nowhere', "there is no bag 'nowhere'"),
+        ('info map.yaml', "'map.yaml' is no bag (a folder, or an .mcap file) and no model (.npz with .json)"),
+        ('import table csv map.yaml out', "'csv' is a folder; give a mapping (YAML), and behind it the source"),
+        ('import table map.yaml csv out', "'signal' has no column of time and no rate; write time: {column: NAME}"),
         ('import tabel map.yaml . out', "did you mean 'table'?"),
         ('demo --recipe defualt', "did you mean 'default'?"),
         ('dashboard --port 99999', 'allowed is 0 to 65535'),
@@ -238,6 +249,14 @@ def test_what_is_missing_or_mistyped_is_named(command, sentence, data, capsys, m
     monkeypatch.chdir(data)
     monkeypatch.delenv('TEXTURE_DATA', raising=False)
     assert sentence in refused(command.split(), capsys)
+
+
+def test_nodes_and_the_check_of_names_need_no_library_of_the_training() -> None:
+    modules = (
+        'texture_estimation.nodes.classifier, texture_features.nodes.feature_extractor, texture_evaluation.commands'
+    )
+    look = f"import sys, {modules}.train; print({{'scipy.stats', 'scipy.signal', 'sklearn'}} & set(sys.modules))"
+    assert subprocess.run([sys.executable, '-c', look], capture_output=True, text=True, check=True).stdout == 'set()\n'
 
 
 def test_a_pattern_that_takes_the_number_of_a_file_for_a_label_is_named(tmp_path, capsys) -> None:

@@ -18,7 +18,7 @@ os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 
 from texture_bringup.command import main
-from texture_bringup.commands.explore import REJECTED
+from texture_bringup.commands.explore import NO_MODEL
 from texture_bringup.operator import Operator
 from texture_core.config import find_file
 from texture_core.types import FeatureVector
@@ -83,8 +83,8 @@ def test_the_live_lines_of_the_page_record_two_surfaces_and_train_a_model_as_pri
     with launched(launch[2], DOMAIN, tmp_path, PATIENT, **given) as launcher:
         launcher.operator(senses=False)
         for order in orders[:-1]:
-            # No label is accepted without a model.
-            assert main(order[1:]) == (REJECTED if order[1] == 'explore' else 0)
+            # There is no label without a model.
+            assert main(order[1:]) == (NO_MODEL if order[1] == 'explore' else 0)
     assert main(orders[-1][1:]) == 0
     surfaces = {order[order.index('--surface') + 1] for order in orders if '--surface' in order}
     assert load_model(tmp_path / orders[-1][-1]).labels == tuple(sorted(surfaces))

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from texture_bringup.commands.start import refuse_wrong
+from texture_bringup.commands.start import raised_limits, refuse_wrong
 from texture_bringup.launcher import find_launch_file, read
 from texture_core import config as resources
 from texture_core.config import parameters_of
@@ -84,6 +84,23 @@ def test_the_page_with_the_limits_has_those_of_the_preset():
     for name in ('robots', 'safety'):
         assert f'(UR5e presets {200 * tolerance:g} %)' in (ROOT / 'docs' / f'{name}.md').read_text()
     assert f'before the slide (UR5e presets {100 * tolerance:g} %)' in (ROOT / 'docs' / 'safety.md').read_text()
+
+
+@pytest.mark.parametrize('emulated', ['true', 'false'])
+@pytest.mark.parametrize(('robot', 'preset'), [('ur', 'ur5e'), ('ros_controllers', 'moveit_servo')])
+def test_a_force_limit_above_that_of_the_preset_is_said_with_both(robot, preset, emulated, tmp_path):
+    def lines(limits):
+        (tmp_path / 'mine.yaml').write_text(f'/**/explorer: {{ros__parameters: {{{limits}}}}}')
+        given = {'emulated': emulated, 'device': 'x', 'explorer_params': str(tmp_path / 'mine.yaml')}
+        more = {'preset': preset} if robot == 'ros_controllers' else {}
+        return list(raised_limits(read(find_launch_file(robot), {**given, **more}, os.environ)))
+
+    assert lines('max_force_n: 40, force_limit_n: 5.0e+1') == [
+        f"'{name}' is {high} N by '{tmp_path}/mine.yaml', above the {safe} N of the preset '{preset}'"
+        for name, high, safe in (('max_force_n', 40, 8), ('force_limit_n', 50, 15))
+    ]
+    assert lines('max_force_n: 8.0, force_limit_n: 15') == []
+    assert lines('max_speed_m_s: 0.1') == []
 
 
 @pytest.mark.parametrize('robot', ROBOTS)

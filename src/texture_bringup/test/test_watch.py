@@ -70,7 +70,7 @@ def test_what_the_estimate_says_is_not_repeated_for_the_classifier():
 def test_a_bag_is_described_by_its_messages_and_slides(bag, capsys):
     assert main(['info', str(bag)]) == 0
     said = capsys.readouterr().out
-    assert '1 messages of tsf85/dynamic, 1 × 1000 Hz' in said
+    assert '1 message of tsf85/dynamic, 1 × 1000 Hz' in said
     assert '1 done' in next(one for one in said.splitlines() if one.strip().startswith('cork'))
 
 
@@ -100,6 +100,7 @@ def test_the_machine_is_shown_on_one_screen(capsys):
     [
         (ExplorationError.NONE, Rejection.NONE, 'a', 0, 'accepted'),
         (ExplorationError.NONE, Rejection.NOVEL, 'a', 3, 'rejected'),
+        (ExplorationError.NONE, Rejection.NO_MODEL, 'a', 5, 'no model'),
         (ExplorationError.FORCE_LIMIT, Rejection.NONE, 'a', 4, 'aborted'),
         (ExplorationError.BUSY, Rejection.NO_MODEL, '', 2, 'refused'),
     ],

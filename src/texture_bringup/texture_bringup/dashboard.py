@@ -373,7 +373,7 @@ class Serving:
             self._loop.close()
             raise LaunchFailed(
                 f"the dashboard cannot listen on '{host}' port {port}: {error.strerror or error}; "
-                'choose another host or port'
+                'choose another host or port, in a launch by dashboard_port:='
             ) from error
 
     @property

@@ -376,6 +376,7 @@ class Supervisor:
 
 # An innermost call: its name, and its arguments separated by one space; one with spaces is quoted.
 CALL = re.compile(r"""\$\(([A-Za-z][\w-]*)((?: (?:"[^"$()]*"|'[^'$()]*'|[^\s"'$()]+))*)\)""")
+VARIABLE = re.compile(r'\$\(var (\w+)\)')
 PERFORMED = re.compile(r'\0(\d+)\0')
 Perform = Callable[[str, Sequence[str]], str]
 
@@ -601,16 +602,20 @@ class _Reader:
 
     def _read_children(self, parent: Element) -> None:
         for element in parent:
-            where = f'of <{element.tag}>'
-            conditions = [name for name in CONDITIONS if name in element.attrib]
-            if all(typed(self.text(element, c), 'bool', f"'{c}' {where}") is CONDITIONS[c] for c in conditions):
+            met = []
+            for name in (name for name in CONDITIONS if name in element.attrib):
+                given = VARIABLE.fullmatch(element.attrib[name])
+                where = f"argument '{given[1]}'" if given else f"'{name}' of <{element.tag}>"
+                met.append(typed(self.text(element, name), 'bool', where) is CONDITIONS[name])
+            if all(met):
                 getattr(self, f'_read_{element.tag}')(element)
 
     def _read_arg(self, element: Element) -> None:
         name = self.text(element, 'name')
         if name not in self._variables:
             if 'default' not in element.attrib:
-                raise InvalidLaunch(f"argument '{name}' is required; give {name}:=VALUE")
+                about = f' ({element.get("description", "").rstrip(".")})' * ('description' in element.attrib)
+                raise InvalidLaunch(f"argument '{name}' is required{about}; give {name}:=VALUE")
             self._variables[name] = self.text(element, 'default')
         value, choices = self._variables[name], [self.text(choice, 'value') for choice in element]
         if choices and value not in choices:

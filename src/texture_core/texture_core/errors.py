@@ -12,6 +12,11 @@ MAX_CHARACTERS = 1000
 ERRNO = re.compile(r"\[Errno -?\d+\] ([^:'\"]*)(: '[^']*')?")
 
 
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun, such as '1 slide' or '2 slides'."""
+    return f'{number} {noun}{"s" * (number != 1)}'
+
+
 class TextureError(Exception):
     """Base of all errors that a user can cause or meet; its text, always one line, is shown to the user unchanged."""
 

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple, Protocol, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.errors import DeviceError, InvalidData
+from texture_core.errors import DeviceError, InvalidData, counted
 
 # --------------------
 # Quality of service of every topic of the suite, in one place: for ROS, and for bags that are written without it.
@@ -147,7 +147,7 @@ class TactileSignal:
             )
         if self.units and len(self.units) != len(self.channels):
             raise InvalidData(
-                f"signal of '{self.sensor}' has {len(self.units)} units for {len(self.channels)} channels; "
+                f"signal of '{self.sensor}' has {len(self.units)} units for {counted(len(self.channels), 'channel')}; "
                 'give one for each, or none'
             )
         if not MIN_HZ <= self.sampling_rate_hz <= MAX_HZ:
@@ -492,7 +492,7 @@ class MessageCodec:
             flat, channels = values['samples'], len(values['channels'])
             if not channels or len(flat) % channels:
                 raise InvalidData(
-                    f"signal message of '{message.sensor}' has {len(flat)} samples for {channels} channels; "
+                    f"signal message of '{message.sensor}' has {len(flat)} samples for {counted(channels, 'channel')}; "
                     'a multiple of the number of channels is needed'
                 )
             values['samples'] = flat.reshape(-1, channels)

@@ -16,8 +16,6 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
-from scipy.stats import t as student
 
 from texture_core.config import MB, find_file, from_mapping, param, read_text, unknown_name
 from texture_core.errors import InvalidData, ModelMismatch
@@ -592,6 +590,9 @@ def calibrate(grades: Array, stds: Array, true: Array, textures: Codes) -> tuple
     if not known.any():
         return Calibration(), {'calibration': 'not calibrated: no held-out window got a grade'}
     missing = 1.0 - float(known.mean())
+    from scipy.optimize import brentq  # noqa: PLC0415  # takes 0.5 s, and only training needs it
+    from scipy.stats import t as student  # noqa: PLC0415
+
     grades, stds, true = grades[known], stds[known], true[known]
     codes, at = np.unique(textures[known], return_inverse=True)
 

@@ -298,11 +298,12 @@ def test_slides_in_bags_report_how_they_were_made(tmp_path) -> None:
     assert examples.motions == {'glass/1': made, 'glass/2': made}
 
 
-def test_slides_of_two_kinds_are_refused_with_both_sensors() -> None:
+def test_slides_of_two_kinds_are_refused_with_both_sensors_before_features_are_computed(monkeypatch) -> None:
     pair = [
         SlideDataset.from_arrays({'signal': arrays(channels=count)}, LABELS, {'signal': RATE_HZ}, sensor=name)
         for count, name in ((2, 'finger/a'), (3, 'finger/b'))
     ]
     mixed = SlideDataset((pair[0][0], pair[1][1]))
+    monkeypatch.setattr(SlideDataset, 'windows', None)
     with pytest.raises(ModelMismatch, match=r"has .* of the sensor 'finger/b', and those before it .* of 'finger/a'"):
         mixed.features(FEATURES)

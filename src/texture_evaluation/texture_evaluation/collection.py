@@ -17,7 +17,7 @@ import numpy as np
 from scipy.stats import beta
 
 from texture_core.config import param
-from texture_core.errors import CollectionError, ExplorationError, InvalidData, InvalidParameter, TextureError
+from texture_core.errors import CollectionError, ExplorationError, InvalidData, InvalidParameter, TextureError, counted
 from texture_core.types import Array, ExplorationRequest, checked_label
 from texture_estimation.acceptance import LEAST_SLIDES_A_LABEL
 from texture_estimation.learners.discriminant import Discriminant
@@ -225,11 +225,11 @@ class PlaceAccuracy:
     def sentence(self) -> str:
         """Results so far."""
         if not self.others:
-            return f'{self.places} place{"s" * (self.places != 1)}; the folder holds no other surface yet'
+            return f'{counted(self.places, "place")}; the folder holds no other surface yet'
         mistaken = f', mostly misidentified as {self.confused}' if self.confused else ''
         found = (
             f'{self.correct} of {self.places} left-out places correct{mistaken}; at new places at least '
-            f'{100 * self.bound:.0f} % (90 % bound), against {self.others} other surface{"s" * (self.others > 1)}'
+            f'{100 * self.bound:.0f} % (90 % bound), against {counted(self.others, "other surface")}'
         )
         if not self.bands:
             return found

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from texture_core.errors import ModelMismatch
+from texture_core.errors import ModelMismatch, counted
 from texture_core.types import AnyArray, Array, FeatureVector, TextureEstimate
 from texture_estimation.evidence import EvidenceAccumulator, single_decisions
 from texture_estimation.model import TextureModel
@@ -231,7 +231,7 @@ def table(result: CrossValidation, split: str) -> list[str]:
     rows = [(fold['name'], fold) for fold in figures['folds']] + [('all', figures)]
     width = max(len('fold'), *(len(name) for name, _ in rows))
     lines = [
-        f"recipe '{result.recipe}', split {split}: {len(result.labels)} surfaces; {result.shift}",
+        f"recipe '{result.recipe}', split {split}: {counted(len(result.labels), 'surface')}; {result.shift}",
         f'{"fold":<{width}}  {"slides":>6}' + ''.join(f'  {title:>20}' for title in COLUMNS),
     ]
     lines += [

@@ -132,7 +132,7 @@ def test_files_next_to_a_model_are_read_back_or_refused(tmp_path):
     path.write_text(json.dumps(correction.as_mapping()))
     assert read_correction(model).fingerprint == correction.fingerprint
     window = WindowBatch(np.zeros((100, 2)), RATE_HZ)
-    with pytest.raises(InvalidData, match='is for 1 channels, and a window has 2'):
+    with pytest.raises(InvalidData, match='is for 1 channel, and a window has 2'):
         correction.apply('signal', window)
     for damaged in ('{"signal": {}}', '[]'):
         path.write_text(damaged)

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import firwin, resample_poly
 
 from texture_core.config import param
 from texture_core.types import NANOSECONDS, Array, ExplorationState, TactileSignal
@@ -119,6 +118,8 @@ def at_speed(windows: SlideWindows, speed: float, count: int) -> Array:
     ratio = Fraction(1.0 / speed).limit_denominator(RATIO_LIMIT)
     if ratio != 1:
         taps = _resampling_filter(max(ratio.numerator, ratio.denominator))
+        from scipy.signal import resample_poly  # noqa: PLC0415
+
         longer = resample_poly(longer, ratio.numerator, ratio.denominator, axis=1, window=taps, padtype='line')
     return longer[:, :count]
 
@@ -126,6 +127,8 @@ def at_speed(windows: SlideWindows, speed: float, count: int) -> Array:
 @lru_cache(maxsize=RATIO_LIMIT)
 def _resampling_filter(rate: int) -> Array:
     """Return the low-pass that `resample_poly` designs at each call, which takes as long as the rest of the call."""
+    from scipy.signal import firwin  # noqa: PLC0415  # takes 0.5 s, and only training needs it
+
     return firwin(20 * rate + 1, 1.0 / rate, window=('kaiser', 5.0))
 
 

@@ -13,10 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import trim_mean
 
 from texture_core.config import load_json, write_json
-from texture_core.errors import InvalidData, ModelMismatch
+from texture_core.errors import InvalidData, ModelMismatch, counted
 from texture_core.types import Array
 from texture_features.windows import WindowBatch
 
@@ -80,6 +79,8 @@ class InputStatistics:
                 f'{np.median(rest_rms):.3g}: too little signal; see that the finger touches the plate, or slide faster '
                 'or harder'
             )
+        from scipy.stats import trim_mean  # noqa: PLC0415  # takes 0.5 s, and every node imports this module
+
         starts = np.arange(0, len(samples) - length + 1, length // 2)
         segments = np.stack([samples[start : start + length] for start in starts])
         segments = (segments - segments.mean(axis=1, keepdims=True)) * np.hanning(length)[:, None]
@@ -169,7 +170,9 @@ def compare(reference: InputStatistics, today: InputStatistics) -> InputComparis
     InvalidData
         If they are of different sensors.
     """
-    ours, theirs = ((one.sensor, f'{one.rate_hz:g} Hz', f'{len(one.channels)} channels') for one in (today, reference))
+    ours, theirs = (
+        (one.sensor, f'{one.rate_hz:g} Hz', counted(len(one.channels), 'channel')) for one in (today, reference)
+    )
     if ours != theirs:
         raise InvalidData(
             f'the reference is of the sensor {", ".join(theirs)}, and this one is {", ".join(ours)}; check the sensor '
@@ -224,7 +227,7 @@ class Correction:
         response_db = self.response_db[topic]
         if response_db.shape[1] != window.samples.shape[-1]:
             raise InvalidData(
-                f"the correction of '{topic}' is for {response_db.shape[1]} channels, and a window has "
+                f"the correction of '{topic}' is for {counted(response_db.shape[1], 'channel')}, and a window has "
                 f'{window.samples.shape[-1]}; check the finger again'
             )
         count = window.samples.shape[-2]

@@ -169,7 +169,7 @@ def test_a_mapping_that_does_not_fit_is_refused_with_the_place(
         ({}, 'the streams are none; name signal or signal_static'),
         ({'streams': {'fast': {'columns': ['a']}}}, 'the streams are fast'),
         ({'streams': {'signal': {'columns': []}}}, "the stream 'signal' has no columns"),
-        ({'streams': {'signal': {'columns': ['a']}}}, 'the label has not one origin'),
+        ({'streams': {'signal': {'columns': ['a']}}}, 'the label has a column or a value, and neither came'),
         ({'streams': {'signal': {'colums': ['a']}}}, "no parameter 'colums'; did you mean 'columns'"),
         ({'streams': {'signal': {'columns': 'a'}}}, "'columns' is 'a'; a list is needed"),
         (
@@ -218,8 +218,8 @@ def test_a_column_whose_name_is_a_long_number_is_refused_with_a_sentence(tmp_pat
 
 
 def test_a_folder_or_nothing_in_place_of_a_mapping_is_refused(tmp_path: Path) -> None:
-    for path in (tmp_path, tmp_path / 'nothing.yaml'):
-        with pytest.raises(InvalidParameter, match=r"there is no file '.*'; give a mapping \(YAML\), and behind it"):
+    for path, fault in ((tmp_path, "' is a folder"), (tmp_path / 'nothing.yaml', "there is no file '.*'")):
+        with pytest.raises(InvalidParameter, match=rf'{fault}; give a mapping \(YAML\), and behind it'):
             load_mapping(path)
 
 

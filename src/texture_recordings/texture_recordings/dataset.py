@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -410,20 +411,27 @@ class SlideDataset:
             from texture_features.augmentation import Augmenter  # noqa: PLC0415  # needs scipy
 
             augmenter = Augmenter(feature_set, augmentation)
+        # One kind of signal, before anything is computed.
+        first = self.slides[0]
+        for topic, slide in itertools.product(feature_set.topics, self.slides):
+            here, usual = (
+                [
+                    f'{topic}={batch.sampling_rate_hz:.6g}Hz*{len(batch.channels)}'
+                    for batch in one.signals.get(topic, ())[:1]
+                ]
+                for one in (slide, first)
+            )
+            if here and usual and here != usual:
+                raise ModelMismatch(
+                    f"slide '{slide.name}' in '{slide.bag}' has {here[0]} of the sensor '{slide.sensor}', and those "
+                    f"before it {usual[0]} of '{first.sensor}' (rate × channels); use slides of one kind; if "
+                    f'only the rates differ, {ONE_RATE}'
+                )
         # One pass over the slides: windows, copies, and windows of other lengths.
         vectors: list[FeatureVector] = []
         resized: list[FeatureVector] = []
         for slide, events in self.windows(feature_set):
-            described = _described(slide, feature_set, events)
-            both = (*vectors[:1], *described[:1])
-            kinds = [one.feature_set.partition(' ')[2] for one in both]
-            if len(set(kinds)) > 1:
-                raise ModelMismatch(
-                    f"slide '{slide.name}' in '{slide.bag}' has {kinds[1]} of the sensor '{both[1].sensor}', and those "
-                    f"before it {kinds[0]} of '{both[0].sensor}' (rate × channels); use slides of one kind; if "
-                    f'only the rates differ, {ONE_RATE}'
-                )
-            vectors += described
+            vectors += _described(slide, feature_set, events)
             resized += feature_set.extract_many(_windows_over(slide, feature_set, distances_m))
             if augmenter is not None:
                 augmenter.add(slide.name, events, slide.signals, slide.states)

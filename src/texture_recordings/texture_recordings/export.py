@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from texture_core.config import library, writing, yaml_text
-from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.errors import InvalidData, InvalidParameter, counted
 from texture_core.types import AnyArray
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.mapping import CONDITION_COLUMNS, UNITS
@@ -45,7 +45,7 @@ def export_slides(dataset: SlideDataset, out: str | Path) -> list[str]:
             (folder / f'{topic}.yaml').write_text(yaml_text(_mapping(topic, samples)), encoding='utf-8')
             surfaces = len({one.surface for one in samples})
             lines.append(
-                f"{len(samples)} slides over {surfaces} surfaces in '{folder / topic}.parquet'; "
+                f"{counted(len(samples), 'slide')} over {counted(surfaces, 'surface')} in '{folder / topic}.parquet'; "
                 f'{topic}.yaml is the mapping by which `texture import table` reads it back'
             )
     return lines

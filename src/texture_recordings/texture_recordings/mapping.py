@@ -221,7 +221,11 @@ class TableMapping:
                     f"column '{stream.time.column}' is under `time` and under `{role}`; name another under one of them"
                 )
         if bool(self.label.column) == bool(self.label.value):
-            raise InvalidParameter('the label has not one origin; give `column` or `value` under `label`')
+            came = 'both came' if self.label.column else 'neither came'
+            raise InvalidParameter(
+                f'the label has a column or a value, and {came}; write label: {{column: NAME}}, a column or a field of '
+                '`files`, or label: {value: NAME}'
+            )
         if self.slides.by == 'column' and not self.slides.column:
             raise InvalidParameter('slides end where a column changes, and none is named; give `column` under `slides`')
 
@@ -251,7 +255,8 @@ class TableMapping:
 def load_mapping(given: str | Path) -> TableMapping:
     """Return the mapping in a file; a sensor that it does not name has the name of the file."""
     if not (path := Path(given).expanduser()).is_file():
-        raise InvalidParameter(f"there is no file '{given}'; give a mapping (YAML), and behind it the source")
+        fault = f"'{given}' is a folder" if path.is_dir() else f"there is no file '{given}'"
+        raise InvalidParameter(f'{fault}; give a mapping (YAML), and behind it the source')
     mapping = mapping_from(load_yaml(path, 'mapping'), f"mapping '{path}'")
     return mapping if mapping.sensor else replace(mapping, sensor=path.stem)
 

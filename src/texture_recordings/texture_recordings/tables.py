@@ -20,7 +20,7 @@ import numpy as np
 
 from texture_core.cli import progress
 from texture_core.config import parse_yaml
-from texture_core.errors import InvalidData
+from texture_core.errors import InvalidData, counted
 from texture_core.types import AnyArray, Array, ExplorationState, Phase, TactileSignal, checked_label
 from texture_recordings.bags import SlideBags, SlideStreams, is_bag, is_cut_off
 from texture_recordings.clock import SAME_RATE, ClockFault, estimated, on_grid, with_malformed
@@ -151,7 +151,8 @@ class ImportReport:
         widths = [max(map(len, column)) for column in zip(*table, strict=True)]
         lines = ['  '.join(map(str.ljust, row, widths)).rstrip() for row in table]
         slides = sum(self.slides.values())
-        total = f'{slides} slides over {len(self.slides)} surfaces from {self.files} files of {self.rows} rows'
+        found = f'{counted(slides, "slide")} over {counted(len(self.slides), "surface")}'
+        total = f'{found} from {counted(self.files, "file")} of {counted(self.rows, "row")}'
         lines.append(total + (f'; {self.with_nan} slides {NAN}' if self.with_nan else ''))
         lines.append('left out: nothing' if not self.left_out else 'left out:')
         for reason, count in self.left_out.items():
@@ -546,6 +547,8 @@ class FrameSlides:
                     f"the times of '{name}' do not grow from row to row; give a column of time that grows and has "
                     'enough digits, or `rate_hz` in its place'
                 )
+        elif not (measured or params.rate_hz):
+            raise InvalidData(f"'{name}' has no column of time and no rate; write time: {{column: NAME}}, or `rate_hz`")
         # Of the first file: windows of all are to have as many samples.
         rate_hz = self._report.rates_hz.get(name) or params.rate_hz or measured
         if measured and not 1 / SAME_RATE <= measured / rate_hz <= SAME_RATE:

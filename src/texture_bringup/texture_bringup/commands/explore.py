@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import argparse
+import fcntl
 import json
 import logging
 import math
@@ -14,7 +15,7 @@ import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, replace
 from functools import partial
@@ -34,11 +35,13 @@ from texture_core.errors import (
     InvalidData,
     InvalidParameter,
     LaunchFailed,
+    ModelMismatch,
     MotionAborted,
     MotionRefused,
     TextureError,
+    counted,
 )
-from texture_core.types import ExplorationRequest, ExplorationState, TextureEstimate
+from texture_core.types import ExplorationRequest, ExplorationState, Rejection, TextureEstimate
 from texture_exploration.motions import MOTIONS
 from texture_exploration.presets import load_preset
 
@@ -128,19 +131,23 @@ def _explore(options: argparse.Namespace) -> int:
     return code
 
 
-ACCEPTED, REJECTED, ABORTED = 0, 3, 4  # 1: fault of the program, 2: invalid input of the user
+ACCEPTED, REJECTED, ABORTED, NO_MODEL = 0, 3, 4, 5  # 1: fault of the program, 2: invalid input of the user
 
 
 def exit_code(result: ExplorationResult) -> int:
-    """Return what `explore` ends with: a label that may be used, none, an abort, or a refused request."""
+    """Return what `explore` ends with: a label that may be used, none, an abort, no fitting model, or a refusal."""
     if not result.exploration_id:
         return USER_ERROR
     if not result.success:
         return ABORTED
+    if result.texture.rejection is Rejection.NO_MODEL:
+        return NO_MODEL
     return ACCEPTED if result.texture.accepted else REJECTED
 
 
-OUTCOMES = {ACCEPTED: 'accepted', REJECTED: 'rejected', ABORTED: 'aborted', USER_ERROR: 'refused'}
+OUTCOMES = {
+    ACCEPTED: 'accepted', REJECTED: 'rejected', ABORTED: 'aborted', NO_MODEL: 'no model', USER_ERROR: 'refused'
+}  # fmt: skip
 
 
 def as_json(result: ExplorationResult) -> dict[str, Any]:
@@ -263,7 +270,7 @@ def _identify(options: argparse.Namespace) -> int:
             likely = np.argsort(-belief, kind='stable')[:SHOWN]
             print(f'  {", ".join(f"{known.textures[k]} {np.exp(belief[k]):.2f}" for k in likely)}')
     best = int(belief.argmax())
-    found = f'{known.textures[best]}, probability {np.exp(belief[best]):.2f} after {number} slides'
+    found = f'{known.textures[best]}, probability {np.exp(belief[best]):.2f} after {counted(number, "slide")}'
     if np.exp(belief[best]) < options.sure:
         found = f'undecided, --sure {options.sure:g} is not reached (nearest: {found})'
     print(f'texture: {found}')
@@ -302,7 +309,7 @@ def collect_surface(
         )
     patch = collection.Patch(low_x, high_x, low_y, high_y)
     plan = collection.PlacePlan(surface, params, patch, (low_n, high_n), (LEAST_SPEED_M_S, high_m_s))
-    if any(map(is_bag, folder.iterdir())):
+    if before := sorted(filter(is_bag, folder.iterdir())):
         try:
             _features_of(folder)  # what cannot be used is refused before the robot moves
         except TextureError as error:
@@ -312,6 +319,7 @@ def collect_surface(
     end = collection.CollectionEnd(CollectionError.CANCELLED, 'stopped', 0)  # by Ctrl-C while the recorder starts
     try:
         with suppress(KeyboardInterrupt), recorder(operator, bag, namespace) as recording:
+            refuse_other_sensor(before, bag, namespace)
             stopped = operator.watch_stops()
 
             def keep(exploration_id: str) -> None:
@@ -343,7 +351,7 @@ def collect_surface(
             end = collection.collect(plan, params, explore, evaluate, _print_progress)
             if recording.end and end.error is not CollectionError.NOT_RECORDED:  # in the last evaluation, say
                 end = replace(end, error=CollectionError.NOT_RECORDED, message=f'{recording.end}; {end.message}')
-    except LaunchFailed:  # the recorder was not discovered
+    except (LaunchFailed, ModelMismatch):  # the recorder was not discovered, or another sensor is
         _remove(bag)
         raise
     end = replace(end, message=f'{end.message}; {losses}; {GAPS}' if losses else end.message, slides=made)
@@ -362,7 +370,7 @@ def _remove(bag: Path) -> None:
 
 
 def _print_progress(sentence: str, slides: int) -> None:
-    print(f'{slides} slide{"s" * (slides != 1)}: {sentence}', flush=True)
+    print(f'{counted(slides, "slide")}: {sentence}', flush=True)
 
 
 def _features_of(folder: Path) -> LabelledFeatures:
@@ -372,6 +380,21 @@ def _features_of(folder: Path) -> LabelledFeatures:
 
     feature_set = FeatureSet.load(RECIPE)
     return SlideDataset.from_bags([folder], topics=feature_set.topics).features(feature_set)
+
+
+def refuse_other_sensor(bags: Sequence[Path], ours: Path, namespace: str) -> None:
+    """Raise ModelMismatch if bags are of another sensor, or rate or channels, than ours, which is being recorded."""
+    from texture_recordings.bags import read_bag
+
+    def sensor(bag: Path, within: str | None = None) -> str:
+        for _, _, batch in read_bag(bag, ('signal',), within):
+            channels = counted(len(batch.channels), 'channel')
+            return f"'{batch.sensor}' ({batch.sampling_rate_hz:.6g} Hz, {channels})"
+        return ''
+
+    for bag in bags:
+        if (there := sensor(bag)) != (came := sensor(ours, namespace)):
+            raise ModelMismatch(f"'{bag}' is of the sensor {there}, this one is {came}; name another folder")
 
 
 class RecorderProcess(Child):
@@ -458,6 +481,23 @@ def _configure_collect(parser: argparse.ArgumentParser) -> None:
     add_namespace(parser)
 
 
+@contextmanager
+def claimed(folder: Path) -> Iterator[None]:
+    """Lock a folder against a second collection, whose bag would be read before it is complete; a kill unlocks it."""
+    lock = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):  # a file system may have no locks
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise InvalidParameter(
+                    f"another `texture collect` records into '{folder}' now; wait for its end, or name another folder"
+                ) from None
+        yield
+    finally:
+        os.close(lock)
+
+
 def _collect(options: argparse.Namespace) -> int:
     """Collect, and report how well left-out places are recognised; return 0 if the bound is met, else 1."""
     from texture_evaluation.collection import CollectionParams, next_bag
@@ -469,14 +509,15 @@ def _collect(options: argparse.Namespace) -> int:
     except OSError as error:
         reason = 'it is a file' if folder.is_file() else error.strerror
         raise InvalidParameter(f"'{folder}' cannot be the folder of the bags: {reason}; name another") from error
-    try:
-        with Operator(options.namespace) as operator:
-            operator.wait_for_explorer(EXPLORER_S, SOON_S)
-            end, bag = collect_surface(operator, options.surface, folder, params, options.namespace)
-    finally:
-        with suppress(OSError):  # bags are in it
-            folder.rmdir()
-    kept = f"; {end.slides} slide{'s' * (end.slides != 1)} in '{bag}'" if bag else ''
+    with claimed(folder):
+        try:
+            with Operator(options.namespace) as operator:
+                operator.wait_for_explorer(EXPLORER_S, SOON_S)
+                end, bag = collect_surface(operator, options.surface, folder, params, options.namespace)
+        finally:
+            with suppress(OSError):  # bags are in it
+                folder.rmdir()
+    kept = f"; {counted(end.slides, 'slide')} in '{bag}'" if bag else ''
     if end.error not in (CollectionError.NONE, CollectionError.BOUND_MISSED):
         following = next_bag(folder, options.surface)
         kept += f"; continue at other places with --seed {params.seed + 1}, into '{following}'"

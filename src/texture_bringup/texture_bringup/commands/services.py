@@ -10,7 +10,7 @@ from collections.abc import Callable
 from texture_bringup.launcher import given_arguments
 from texture_bringup.operator import Operator
 from texture_core.cli import Command, add_namespace
-from texture_core.errors import InvalidParameter
+from texture_core.errors import InvalidParameter, counted
 
 # --------------------
 # Services without values, each an `std_srvs/Trigger`.
@@ -64,7 +64,7 @@ def _add(options: argparse.Namespace) -> int:
             print(operator.remove_last_added())
             return 0
         examples, message = operator.add(options.label, options.exploration)
-    print(f"{message}; '{options.label.strip()}' has {examples} windows now")
+    print(f"{message}; '{options.label.strip()}' has {counted(examples, 'window')} now")
     return 0
 
 

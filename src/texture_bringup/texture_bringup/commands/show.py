@@ -111,6 +111,7 @@ def _configure_info(parser: argparse.ArgumentParser) -> None:
 
 
 def _info(options: argparse.Namespace) -> int:
+    from texture_core.errors import InvalidData
     from texture_recordings.bags import bags_in
 
     path = Path(options.path)
@@ -120,6 +121,8 @@ def _info(options: argparse.Namespace) -> int:
     if not path.is_dir() and (half or path.suffix in endings):
         print('\n'.join(_model_lines(path)))
         return 0
+    if path.is_file() and path.suffix != '.mcap':
+        raise InvalidData(f"'{path}' is no bag (a folder, or an .mcap file) and no model (.npz with .json); name one")
     for bag in bags_in(path):
         print(f'{bag}\n{table(_bag_rows(bag, options.namespace))}')
     return 0
@@ -139,6 +142,7 @@ def _model_lines(path: Path) -> list[str]:
 
 def _bag_rows(bag: Path, namespace: str | None) -> Iterator[Row]:
     """Yield number of messages by topic, length, sensors, and the slides over each surface of a bag."""
+    from texture_core.errors import counted
     from texture_core.types import ExplorationState, Phase, TactileSignal
     from texture_recordings.bags import read_bag
 
@@ -155,7 +159,7 @@ def _bag_rows(bag: Path, namespace: str | None) -> Iterator[Row]:
             ends[value.exploration_id] = value.surface, value.phase
     yield '  length', f'{(last_ns - first_ns) / NANOSECONDS:.1f} s'
     for topic, count in sorted(counts.items()):
-        yield f'  {topic}', f'{count} messages{f" of {sensors[topic]}" if topic in sensors else ""}'
+        yield f'  {topic}', f'{counted(count, "message")}{f" of {sensors[topic]}" if topic in sensors else ""}'
     for surface in sorted({surface for surface, _ in ends.values()}):
         phases = Counter(phase.value for name, phase in ends.values() if name == surface)
         yield f'  {surface or "(no surface)"}', ', '.join(f'{count} {phase}' for phase, count in phases.items())

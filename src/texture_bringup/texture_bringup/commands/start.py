@@ -7,7 +7,6 @@ from __future__ import annotations
 import argparse
 import fcntl
 import os
-import re
 import signal
 import sys
 import time
@@ -26,6 +25,7 @@ from typing import Any
 
 from texture_bringup.launcher import (
     EXPLORER,
+    VARIABLE,
     NodeDescription,
     Supervisor,
     find_launch_file,
@@ -33,7 +33,15 @@ from texture_bringup.launcher import (
     read,
 )
 from texture_core.cli import Command, add_namespace, add_parameters, add_seed, parameters_from, task
-from texture_core.config import check_parameter_file, find, from_mapping, parameter_sections, parameters_of, reaches
+from texture_core.config import (
+    check_parameter_file,
+    find,
+    folder,
+    from_mapping,
+    parameter_sections,
+    parameters_of,
+    reaches,
+)
 from texture_core.errors import InvalidLaunch, InvalidParameter, LaunchFailed, UnknownName
 
 # Each command imports what it starts when it runs: a launcher is a child of many programs, and is up sooner without.
@@ -51,6 +59,8 @@ def _launch(options: argparse.Namespace) -> int:
     given = given_arguments(options.arguments)
     nodes = read(find_launch_file(options.file), given, os.environ)
     refuse_wrong(nodes)
+    for line in raised_limits(nodes):
+        _say(f'[launch] warning: {line}')
     return Supervisor(nodes, _say, together=options.together).run()
 
 
@@ -68,7 +78,14 @@ LOADED: Mapping[str, Callable[[Any], Any]] = {
     ),
     'feature_extractor': lambda given: _call('texture_features.feature_set:FeatureSet.load', given.recipe),
     'adaptor': lambda given: _call('texture_drivers.adaptor:load_mapping', given.mapping, given.finger),
-    'replay': lambda given: given.bag and _call('texture_recordings.bags:bags_in', given.bag),
+    'replay': lambda given: (
+        given.bag
+        and (
+            _call('texture_recordings.slides:find_slides', [given.bag], given.slides, given.from_namespace or None)
+            if given.slides
+            else _call('texture_recordings.bags:bags_in', given.bag)
+        )
+    ),
     'sensor': lambda given: _call('texture_drivers.catalogue:make_sensor', given, time.time_ns),
 }
 OF_ROS = {'use_sim_time', 'start_type_description_service'}  # parameters of every node
@@ -183,7 +200,7 @@ def _settings(node: NodeDescription, nodes: Sequence[NodeDescription]) -> Simple
 
 def _argument(node: NodeDescription, name: str) -> str:
     """Return where a launch file has the value of a parameter: its argument, or the node."""
-    found = re.findall(r'\$\(var (\w+)\)', node.origins.get(name, ''))
+    found = VARIABLE.findall(node.origins.get(name, ''))
     return f"launch argument '{found[0]}'" if found else 'launch file'
 
 
@@ -193,6 +210,22 @@ def _number(kind: type, value: Any) -> Any:
         with suppress(ValueError):
             return float(value)
     return value
+
+
+def raised_limits(nodes: Sequence[NodeDescription]) -> Iterator[str]:
+    """Yield a sentence for each force limit that a user's file sets above that of the preset of the robot."""
+    for node in (node for node in nodes if node.executable == EXPLORER):
+        found = [(path, values) for path, _, values in _sections(node)]
+        if any(values.get('arm') == 'ur' for _, values in found):  # a file for it begins as a copy of this preset
+            path = folder('texture_bringup', 'config/robots') / 'ur5e.yaml'
+            found[:0] = [(path, values) for _, values in parameter_sections(path)]
+        for name in ('max_force_n', 'force_limit_n'):
+            given = [(path, float(values[name])) for path, values in found if name in values]
+            safe = [(path.stem, force_n) for path, force_n in given if path and path.parent.name == 'robots']
+            for preset, safe_n in safe[-1:]:
+                file, force_n = given[-1]
+                if force_n > safe_n:
+                    yield f"'{name}' is {force_n:g} N by '{file}', above the {safe_n:g} N of the preset '{preset}'"
 
 
 def claim(pipe: Path) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from typing import Any, ClassVar
 
 from rclpy.node import Node
@@ -14,7 +15,7 @@ from std_srvs.srv import Trigger
 from texture_msgs import msg, srv
 
 from texture_core.config import param
-from texture_core.errors import InvalidParameter, ModelMismatch, TextureError, UnknownName
+from texture_core.errors import InvalidParameter, ModelMismatch, TextureError, UnknownName, counted
 from texture_core.ros import (
     ESTIMATE_QOS,
     FEATURE_QOS,
@@ -212,7 +213,9 @@ class Classifier(EstimatorNode):
         model = self._use_updated_model()
         answer.error_code = srv.AddTexture.Response.ERROR_NONE
         added_slide = model.added_slides[-1]
-        new = ', a new texture,' * (added_slide.label not in known)
+        near = [] if added_slide.label in known else get_close_matches(added_slide.label, known, n=1)
+        hint = f" (did you mean '{near[0]}'? `texture add --undo` takes it back)" if near else ''
+        new = f', a new texture{hint},' * (added_slide.label not in known)
         answer.message = f"added '{added_slide.label}'{new} from '{added_slide.exploration_id}'; {_known(model)}"
         return answer
 
@@ -237,7 +240,7 @@ class Classifier(EstimatorNode):
         answer.slides = len(removed)
         model = self._use_updated_model()
         stays = ' which stays as it was trained;' if removed[0].label in model.labels else ''
-        answer.message = f"removed {_slides(len(removed))} of '{removed[0].label}';{stays} " + _known(model)
+        answer.message = f"removed {counted(len(removed), 'slide')} of '{removed[0].label}';{stays} " + _known(model)
         return answer
 
     def _require_incremental(self) -> IncrementalClassifier:
@@ -267,11 +270,9 @@ def _refused(answer: Any, error: TextureError | OSError) -> Any:
 
 
 def _known(model: TextureModel) -> str:
-    return f'{len(model.labels)} textures, {_slides(len(model.added_slides))} added since the training'
-
-
-def _slides(number: int) -> str:
-    return f'{number} {"slide" if number == 1 else "slides"}'
+    return (
+        f'{counted(len(model.labels), "texture")}, {counted(len(model.added_slides), "slide")} added since the training'
+    )
 
 
 def main() -> None:

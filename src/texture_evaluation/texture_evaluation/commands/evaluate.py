@@ -13,7 +13,7 @@ from pathlib import Path
 
 from texture_core.cli import Command, add_bag_namespace, add_dask, add_seed, add_slides, core_count
 from texture_core.config import check_outputs, shipped, write_json
-from texture_core.errors import InvalidParameter
+from texture_core.errors import InvalidParameter, counted
 from texture_estimation.model import both_files, load_model
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.charts import refuse_chart_format
@@ -99,7 +99,8 @@ def _cross_validate(options: argparse.Namespace) -> int:
         write_json({**setting, **(figures[0] if len(figures) == 1 else several)}, options.json)
     if options.chart:
         of = ', '.join(Path(bag).name for bag in bags)
-        title = f'{of}: {len(dataset)} slides of {len(results[0].labels)} surfaces, split {split.name}'
+        surfaces = counted(len(results[0].labels), 'surface')
+        title = f'{of}: {counted(len(dataset), "slide")} of {surfaces}, split {split.name}'
         print(comparison_chart(results, f'{title}; {results[0].shift}', options.chart))
     return 0
 

@@ -7,14 +7,19 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from texture_core.cli import add_bag_namespace, add_slides
+from texture_core.cli import add_bag_namespace, add_slides, task
 from texture_core.config import shipped
 from texture_core.errors import InvalidParameter
-from texture_estimation.acceptance import LEAST_SLIDES_A_LABEL
-from texture_estimation.model import TextureModel
-from texture_estimation.roughness import RoughnessModel
-from texture_evaluation.train import train_from_bags, train_grades_from_bags
+from texture_features.feature_set import read_recipe
+
+if TYPE_CHECKING:
+    from texture_estimation.model import TextureModel
+    from texture_estimation.roughness import RoughnessModel
+
+# What trains is imported when the names are known to be right.
+# ruff: noqa: PLC0415
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -35,14 +40,18 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Train, save, and report what was trained."""
     _check_place(Path(options.out), replace=options.force)
+    if not options.grades and options.recipe in shipped('texture_estimation', 'config/roughness'):
+        raise InvalidParameter(f"recipe '{options.recipe}' learns grades of roughness; give them with --grades FILE")
+    kind = ('config/roughness', 'roughness recipe') if options.grades else ('config/recipes', 'recipe')
+    read_recipe(options.recipe, *kind)
+    with task('loading the libraries of train'):
+        from texture_evaluation.train import train_from_bags, train_grades_from_bags
     if options.grades:
         graded = train_grades_from_bags(
             options.recipe, options.bags, options.grades, options.slides, options.out, namespace=options.namespace
         )
         print('\n'.join(graded_summary(graded, Path(options.out))))
         return 0
-    if options.recipe in shipped('texture_estimation', 'config/roughness'):
-        raise InvalidParameter(f"recipe '{options.recipe}' learns grades of roughness; give them with --grades FILE")
     model = train_from_bags(options.recipe, options.bags, options.slides, options.out, namespace=options.namespace)
     print('\n'.join(summary(model, Path(options.out))))
     return 0
@@ -64,6 +73,8 @@ def _check_place(out: Path, *, replace: bool) -> None:
 
 def summary(model: TextureModel, out: Path) -> list[str]:
     """Return the labels of a model and its held-out accuracy, in lines."""
+    from texture_estimation.acceptance import LEAST_SLIDES_A_LABEL
+
     training = model.training
     accuracy, slides = training['held_out_window_accuracy'], model.acceptance.domain.slides
     held_out, fewest = 'nothing was held out', min(slides.values(), default=0)
@@ -90,6 +101,8 @@ def summary(model: TextureModel, out: Path) -> list[str]:
 
 def _unfit(model: TextureModel) -> list[str]:
     """Return warnings that the recipe does not fit the data: no better than chance, or more windows than samples."""
+    from texture_estimation.acceptance import LEAST_SLIDES_A_LABEL
+
     training, labels = model.training, len(model.labels)
     warnings = []
     chance = 1.0 / max(labels, 1)

@@ -12,7 +12,7 @@ from typing import Any
 
 from texture_core.cli import Command, add_bag_namespace, add_parameters, add_slides, parameters_from, task
 from texture_core.config import find
-from texture_core.errors import InvalidParameter
+from texture_core.errors import InvalidParameter, counted
 from texture_features.segmentation import SegmentationParams
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.export import export_slides
@@ -41,7 +41,7 @@ def _import(options: argparse.Namespace) -> int:
     if options.dry_run and mapped and len(options.places) == 2:
         options.places.append('')
     if len(options.places) != 2 + mapped:
-        raise InvalidParameter(f'{len(options.places)} places were given after {options.data_set}; write {USAGE}')
+        raise InvalidParameter(f'after {options.data_set} came {counted(len(options.places), "place")}; write {USAGE}')
     if options.dry_run and not mapped:
         raise InvalidParameter(f'--dry-run prints what a mapping means; {options.data_set} has none, leave it out')
     for bag in _import_mapped(options) if mapped else importer(*options.places):
@@ -79,7 +79,7 @@ def _segment(options: argparse.Namespace) -> int:
     params = parameters_from(options, SegmentationParams)
     found = segment_bags(options.bags, Path(options.out), params, options.surface, options.namespace)
     for path, slides in found.items():
-        print(f'{path}: {slides} slides')
+        print(f'{path}: {counted(slides, "slide")}')
     return 0
 
 
