@@ -122,8 +122,7 @@ def _mean_hz(times: Array) -> float:
 
 def _rest(times: Array, numbers: AnyArray) -> Array:
     """Return by how much numbers are above a line over the time."""
-    since = times - times[0]
-    if len(times) < 3 or not np.ptp(since) > 0:
+    if len(times) < 3 or not np.ptp(since := times - times[0]) > 0:
         return np.zeros(len(times))
     return np.asarray(numbers - np.polyval(np.polyfit(since, numbers.astype(float), 1), since))
 
@@ -155,5 +154,4 @@ def with_malformed(times: Array, kept: AnyArray) -> Array:
     usual = np.median(step)
     fits = np.abs(step - count * usual) < 0.5 * usual
     between = fits[np.clip(np.searchsorted(at, rows) - 1, 0, len(fits) - 1)]
-    filled = np.interp(rows, at, times[at], np.nan, np.nan)
-    return np.where(np.isnan(times) & kept & between, filled, times)
+    return np.where(np.isnan(times) & kept & between, np.interp(rows, at, times[at], np.nan, np.nan), times)
