@@ -103,7 +103,7 @@ OVERLAP = np.r_[T[:300], 2.7 + T[:300]].round(2)
 PAUSE = {'slides': {'by': 'pause', 'min_s': 0.05}}
 BACK = r"row \d+, column 't': time goes back .*by: pause"
 CLOCKS: dict[str, tuple[Write, dict, Truth]] = {
-    'a buffer that is read at any time': (csv(UNEVEN, X), {}, '350 times come twice: .* a buffer that is stamped when'),
+    'a buffer that is read at any time': (csv(UNEVEN, X), {}, '350 of 600 times come twice: .* a buffer that is'),
     'ms at 1000 Hz': (
         csv((T[~LOST] / 10).round(3), X[~LOST]), {},
         'row 101, .*a gap of 0.003 s follows: samples were lost there, or time, which counts in .* 1000 Hz, was round',
@@ -142,6 +142,9 @@ CLOCKS: dict[str, tuple[Write, dict, Truth]] = {
     ),
     'a turntable for two minutes': (csv(20 * T, X), {'conditions': {'speed': {'value': '0.1'}}}, CORK),
     'a speed of 0': (csv(T, X), {'conditions': {'speed': {'value': '0'}}}, 'speed of a slide is 0 m/s, plausible are'),
+    'rows in no order': (
+        csv(np.random.default_rng(0).permutation(T), X), {}, 'do not grow .*; if rows are out of order, sort them by t',
+    ),
     'a force of 0': (csv(T, X), {'conditions': {'force': {'value': '0'}}}, 'is 0 N, .*; leave out what is unknown'),
     **{
         f'a force of {force} N in a column': (
@@ -172,7 +175,7 @@ CLOCKS: dict[str, tuple[Write, dict, Truth]] = {
     ),
     'runs overlap': (csv(OVERLAP, X), {}, 'row 302, .*time goes back from 2.99 to 2.7 s, .*by: pause'),
     'runs overlap by pause': (csv(OVERLAP, X), PAUSE, 'row 302, .*time goes back to 2.7 s, into the run that began'),
-    'a row twice': (csv(np.insert(T, 9, T[9]), np.insert(X, 9, X[9])), {}, '1 times come twice.*save each row once'),
+    'a row twice': (csv(np.insert(T, 9, T[9]), np.insert(X, 9, X[9])), {}, '1 of 601 times come twice.*save each row'),
     'a row ahead': (csv(np.where(np.arange(N) == 300, T + 0.05, T).round(2), X), {}, 'row 303, .*3.05 to 3.01 s, 1 t'),
 }  # fmt: skip
 
@@ -196,6 +199,8 @@ SAME = r'.* have the same samples in all or in a part; a copy is no further slid
 LONG = np.random.default_rng(0).normal(size=180_000).round(4)
 COARSE = np.rint(2 * np.random.default_rng(2).normal(size=(3, N))).astype(int)
 HUMS = np.rint(5 * np.sin(np.pi * np.arange(20_000) / 10) + np.random.default_rng(0).normal(0, 0.05, (2, 20_000)))
+STROKE = 100 * np.sin(0.3 * np.arange(3000)) + 50 * np.sin(1.1 * np.arange(3000))
+REPEATS = np.rint(STROKE + np.random.default_rng(0).normal(0, 0.4, (10, 3000)))
 HALVES: Truth = [('cork', X[:300]), ('felt', X[300:])]
 CODES = {'label': {'column': 'l', 'names': {0: 'cork', 1: 'felt'}}, 'slides': {'by': 'column', 'column': 'l'}}
 BOTH = {
@@ -332,6 +337,13 @@ LABELS: dict[str, tuple[Write, dict, Truth]] = {
             ('few samples', X, np.r_[Y[:300], X[300:320], Y[320:]]),
         )
     },
+    'a robot that repeats itself to 0.4 levels': (
+        npz(**{f'{number}/x': run for number, run in enumerate(REPEATS)}), {**ANY, **RATE, 'tables': '{i}'},
+        [('cork', run) for run in REPEATS],
+    ),
+    'a part of a coarse channel': (
+        both(csv(T, REPEATS[0][:N]), csv(T[:60], REPEATS[0][200:260], name='felt_7.csv')), {}, SAME,
+    ),
     'a hum of few levels, and again': (
         npz(**{f'{number}/x': hum for number, hum in enumerate(HUMS)}), {**ANY, **RATE, 'tables': '{i}'},
         [('cork', hum) for hum in HUMS],
@@ -513,7 +525,7 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
     },
     **{
         f'{count} rows of each sample': (
-            csv(T, X.repeat(count)[:N]), {}, f"each sample of 'signal' comes {count} times, as if a slower sensor were",
+            csv(T, X.repeat(count)[:N]), {}, f"'signal' has each sample {count} times, as if a slower sensor were",
         )
         for count in (2, 3, 7)
     },
@@ -531,13 +543,17 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
     **{
         f'{name} as a channel': (
             csv(times, X, names='t,x'), {'streams': {'signal': {'columns': ['*'], 'rate_hz': 100.0}}},
-            "channel 't' of 'signal' rises from each sample to the next, as time or a counter does; leave it out of",
+            r"channel 't' of 'signal' rises \d+ times and falls \d+ times, as time, a counter or a position does; lea",
         )
-        for name, times in (('time', T), ('time that jitters', T + 0.004 * (np.arange(N) % 3)), ('a counter', range(N)))
+        for name, times in (
+            ('time', T), ('time that jitters', T + 0.004 * (np.arange(N) % 3)), ('a counter', range(N)),
+            ('a counter that rolls over at 256', np.arange(N) % 256), ('a counter that falls', range(N, 0, -1)),
+            ('a counter with each number twice', np.arange(N) // 2), ('time of a minute', (T + 57).round(2) % 60),
+        )
     },
-    'a stream that stands still': (csv(X, [1.5] * N, names='x,y'), BOTH, "no channel of 'signal_static' changes"),
+    'a stream that stands still': (csv(X, [1.5] * N, names='x,y'), BOTH, "'signal_static' does not change"),
     'no slide that changes': (
-        csv(T, [1.5] * 100 + [''] + [1.5] * 499), {}, 'with samples that change .*: 1 slides in which no ch',
+        csv(T, [1.5] * 100 + [''] + [1.5] * 499), {}, 'with samples that change .*: 1 slides in which .signal. does n',
     ),
     'rows that stand still': (
         npz(X=np.r_[WINDOWS, np.ones((2, 40)) * [[1], [2]]]),
@@ -786,7 +802,7 @@ CONTAINERS: dict[str, tuple[Write, dict, Truth]] = {
     'records of arrays': (
         records, {**ANY, 'streams': {'signal': {'columns': ['d.acc.*'], 'rate_hz': 100.0}}}, [('cork', np.c_[X, Y])],
     ),
-    'objects': (npz(x=X.astype(object)), {**ANY, **RATE}, 'Object arrays .*; save its arrays as numbers$'),
+    'objects': (npz(x=X.astype(object)), {**ANY, **RATE}, 'Object arrays .*; save .* as numbers, slides of un'),
     'an array on its side': (
         npz(**{'1/a': np.c_[T, 0.06 + 0.01 * X, 0.05 + 0.01 * X, 0.1 + 0.01 * Y].T}),
         {**ANY, **numbered('1-3'), 'tables': '{i}/a'},
@@ -1046,6 +1062,25 @@ def run(folder: Path, kinds: tuple[str, ...] = MAPPED['table'], **content: Any) 
     source = content.pop('source', folder)
     mapping = mapping_from({'files': '{material}_{run}.*', 'label': {'column': 'material'}, **content})
     return import_tables(mapping, source, folder / 'bags', kinds)
+
+
+def test_the_report_names_channels_that_alone_stand_still_and_slides_without_a_speed(tmp_path: Path) -> None:
+    still = {'a': [9.81] * N, 'b': np.r_[U[:300], [U[300]] * 300], 'c': np.repeat(V, 10)[:N], 'd': Y}
+    csv(T, X, *still.values(), [''] * N, names='t,x,a,b,c,d,v')(tmp_path)
+    signal = {'columns': ['x', 'a', 'b', 'c', 'd'], 'time': {'column': 't'}, 'unit': 'm/s^2'}
+    report = run(tmp_path, streams={'signal': signal}, conditions={'speed': {'column': 'v'}})
+    assert report.lines()[2:] == [
+        '1 slide over 1 surface from 1 file of 600 rows',
+        'left out: nothing',
+        'kept; check the sensor and the columns:',
+        "  1 slides in which 'a' of 'signal' does not change",
+        "  1 slides in which 'b' of 'signal' does not change for over 0.1 s, as while a sensor is frozen or the finger "
+        'rests (cut rest off)',
+        "  1 slides in which 'c' of 'signal' has each sample 10 times, as if a slower sensor were held",
+        '  1 slides without speed',
+    ]
+    [slide] = SlideDataset.from_bags(report.bags)
+    assert {*slide.signals['signal'][0].units} == {'m/s²'}
 
 
 def test_the_report_states_how_malformed_rows_were_treated(tmp_path: Path) -> None:

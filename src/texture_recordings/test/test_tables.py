@@ -138,7 +138,7 @@ def test_losses_are_counted_and_rows_whose_times_contradict_each_other_are_refus
     assert total(report) == (9 * STROKE_ROWS, 7)
     assert not report.left_out
     recorded[0].time_ms[FIRST_STROKE + 50] -= 55.0  # before five others
-    with pytest.raises(InvalidData, match=r'time goes back from .* 1 times in this slide; sort its rows'):
+    with pytest.raises(InvalidData, match=r'time goes back from .* 1 times in this slide; sort its rows by time'):
         import_tables(mapping, write_csv(tmp_path / 'again', recorded), None)
 
 
@@ -170,6 +170,10 @@ def test_a_mapping_that_does_not_fit_is_refused_with_the_place(
         ({'streams': {'fast': {'columns': ['a']}}}, 'the streams are fast'),
         ({'streams': {'signal': {'columns': []}}}, "the stream 'signal' has no columns"),
         ({'streams': {'signal': {'columns': ['a']}}}, 'the label has a column or a value, and neither came'),
+        (
+            {**TIMED, 'conditions': {'force': {'column': 'f', 'value': 5}}},
+            'the force has a column or a value, and both came',
+        ),
         ({'streams': {'signal': {'colums': ['a']}}}, "no parameter 'colums'; did you mean 'columns'"),
         ({'streams': {'signal': {'columns': 'a'}}}, "'columns' is 'a'; a list is needed"),
         (

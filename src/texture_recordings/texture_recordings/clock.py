@@ -39,8 +39,7 @@ def estimated(steps: Array) -> float:
         return 0.0
     rate_hz = float(1.0 / usual.mean())
     simple = float(f'{rate_hz:.2g}')
-    near = abs(rate_hz / simple - 1.0) < ROUND_RATE
-    return simple if near else float(f'{rate_hz:.{SIGNIFICANT}g}')
+    return simple if abs(rate_hz / simple - 1.0) < ROUND_RATE else float(f'{rate_hz:.{SIGNIFICANT}g}')
 
 
 def on_grid(times: Array, rate_hz: float, *, stated: bool = False) -> tuple[slice, AnyArray, Counter[str]]:
@@ -53,8 +52,8 @@ def on_grid(times: Array, rate_hz: float, *, stated: bool = False) -> tuple[slic
         row = int(np.argmax(steps < 0)) + 1
         raise ClockFault(
             row, f'time goes back from {times[row - 1]:.9g} to {times[row]:.9g} s, {(steps < 0).sum()} times in this '
-            'slide; sort its rows by time; where the file holds several runs, write slides: {by: pause}, or cut them '
-            f'by a column; to times behind the roll of a counter, or midnight, add its period; {WITHOUT_TIME}',
+            'slide; sort its rows by time if they are in disorder; for several runs write slides: {by: pause}, or cut '
+            f'them by a column; to times behind the roll of a counter, or midnight, add its period; {WITHOUT_TIME}',
         )  # fmt: skip
     index = _places(times, rate_hz, stated=stated)
     # Of a row or two behind a gap at an end nobody knows whether the gap or their time is wrong.
@@ -80,9 +79,9 @@ def _places(times: Array, rate_hz: float, *, stated: bool) -> AnyArray:
     unlike = np.flatnonzero(steps < SAME_TIME)
     if len(unlike):
         raise ClockFault(
-            int(unlike[0]), f'{len(unlike)} times come twice: of a coarse clock, a buffer that is stamped when it is '
-            'read, several sensors, or rows that were saved twice; choose rows (`rows: {column: value}`), or save each '
-            f'row once; {WITHOUT_TIME}',
+            int(unlike[0]), f'{len(unlike)} of {len(times)} times come twice: of a coarse clock, a buffer that is '
+            'stamped when it is read, several sensors, or rows that were saved twice; choose rows (`rows: {column: '
+            f'value}}`), or save each row once; {WITHOUT_TIME}',
         )  # fmt: skip
     # A late row is followed by a short step, an early one comes after one, a loss is not.
     pairs = np.minimum(steps + np.append(steps[1:], np.inf), steps + np.append(np.inf, steps[:-1])[: len(steps)])
@@ -123,8 +122,7 @@ def _mean_hz(times: Array) -> float:
 
 def _rest(times: Array, numbers: AnyArray) -> Array:
     """Return by how much numbers are above a line over the time."""
-    since = times - times[0]
-    if len(times) < 3 or not np.ptp(since) > 0:
+    if len(times) < 3 or not np.ptp(since := times - times[0]) > 0:
         return np.zeros(len(times))
     return np.asarray(numbers - np.polyval(np.polyfit(since, numbers.astype(float), 1), since))
 
@@ -156,5 +154,4 @@ def with_malformed(times: Array, kept: AnyArray) -> Array:
     usual = np.median(step)
     fits = np.abs(step - count * usual) < 0.5 * usual
     between = fits[np.clip(np.searchsorted(at, rows) - 1, 0, len(fits) - 1)]
-    filled = np.interp(rows, at, times[at], np.nan, np.nan)
-    return np.where(np.isnan(times) & kept & between, filled, times)
+    return np.where(np.isnan(times) & kept & between, np.interp(rows, at, times[at], np.nan, np.nan), times)

@@ -50,6 +50,7 @@ UNITS = (
     '', 'count', 'g', 'm/s²', 'm/s', 'm', 'mm', 'rad/s', 'rad', 'deg', 'Pa', 'hPa', 'kPa', 'bar', 'N', 'mN', 'N m', 'T',
     'mT', 'µT', 'G', 'V', 'mV', 'A', 'mA', 'C', 'pC', 'F', 'pF', 'Ω', 'kΩ', '°C', 'K', '%',
 )  # fmt: skip
+SAME_UNITS = {'m/s^2': 'm/s²', 'uT': 'µT', 'Ohm': 'Ω', 'kOhm': 'kΩ'}
 TIME_UNITS: Mapping[str, float] = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'min': 60.0}
 # How names of columns end that name their unit: t_ms, 't (s)', 'time [us]'; in the order of TIME_UNITS.
 UNIT_IN_NAME = re.compile(
@@ -104,7 +105,7 @@ class StreamColumns:
     channels: list[str] = param(  # noqa: RUF009 – it gives a field
         [], 'Names the channels in the bag; [] takes the names of the columns.'
     )
-    unit: str = param('', "Names the unit of the samples after scaling; '' if unknown.", choices=UNITS)
+    unit: str = param('', "Names the unit of the samples after scaling; '' if unknown.", choices=(*UNITS, *SAME_UNITS))
     scale: float = param(1.0, 'Factor by which samples are multiplied.')
     rate_hz: float = param(
         0.0, 'Sampling rate; 0 takes it from the column of time, or from the file.', unit='Hz', low=0.0, high=MAX_HZ
@@ -119,6 +120,7 @@ class StreamColumns:
     time: TimeColumn = field(default_factory=TimeColumn)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, 'unit', SAME_UNITS.get(self.unit, self.unit))
         if not self.scale:
             raise InvalidParameter(
                 "parameter 'scale' is 0, by which all samples are 0; write another factor, such as 1"
@@ -220,12 +222,14 @@ class TableMapping:
                 raise InvalidParameter(
                     f"column '{stream.time.column}' is under `time` and under `{role}`; name another under one of them"
                 )
-        if bool(self.label.column) == bool(self.label.value):
-            came = 'both came' if self.label.column else 'neither came'
-            raise InvalidParameter(
-                f'the label has a column or a value, and {came}; write label: {{column: NAME}}, a column or a field of '
-                '`files`, or label: {value: NAME}'
-            )
+        origins: Mapping[str, LabelColumn | Quantity] = {**self.conditions, 'label': self.label}
+        for name, one in origins.items():
+            if bool(one.column) == bool(one.value):
+                came = 'both came' if one.column else 'neither came'
+                raise InvalidParameter(
+                    f'the {name} has a column or a value, and {came}; write {name}: {{column: NAME}}, a column or a '
+                    f'field of `files`, or {name}: {{value: …}}'
+                )
         if self.slides.by == 'column' and not self.slides.column:
             raise InvalidParameter('slides end where a column changes, and none is named; give `column` under `slides`')
 

@@ -148,7 +148,9 @@ def frames(path: Path, place: str, mapping: TableMapping) -> Iterator[TableFrame
             raise
         except Exception as error:  # whatever a library raises, which depends on the byte that is wrong
             reason = (str(error) or type(error).__name__)[:300]
-            again = 'save its arrays as numbers' if 'Object arrays' in reason else 'save it again'
+            again = 'it may have been cut off: copy or save it again'
+            if 'Object arrays' in reason:
+                again = 'save its arrays as numbers, slides of unequal length as an array each (`tables` names them)'
             raise InvalidData(f'it cannot be read: {reason}; {again}') from error
 
 
@@ -686,8 +688,7 @@ def _fields_of(value: Any, msgtype: str) -> dict[str, Any]:
     found: dict[str, Any] = {}
     if msgtype == 'sensor_msgs/msg/JointState':  # whose order may differ from bag to bag
         for kind in ('position', 'velocity', 'effort'):
-            numbers = zip(value.name, getattr(value, kind), strict=False)
-            found |= {f'{kind}.{joint}': number for joint, number in numbers}
+            found |= {f'{kind}.{joint}': one for joint, one in zip(value.name, getattr(value, kind), strict=False)}
     else:
         if sum(axis.size > 1 for axis in getattr(getattr(value, 'layout', None), 'dim', ())) > 1:
             raise InvalidData('its array has several dimensions; republish it flat, or use `SlideDataset.from_arrays`')

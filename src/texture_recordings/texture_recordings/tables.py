@@ -50,27 +50,30 @@ PLAUSIBLE_HZ, LIKELY_HZ = (5.0, 200_000.0), (20.0, 20_000.0)
 LONGEST_SLIDE_S = 1800.0
 LONGEST_TRACK_M = 50.0  # many turns of a turntable; a second at 8 kHz, read as 1000 s, has more
 MOST_ROUNDING, NO_CHANGE = 0.01, 1e-12  # of the standard deviation, and of the largest value, by rounding in 64 bits
-NAN = 'have NaN samples, and windows with one are unusable'
 SAME_TIME_S = 1e-9
 MAX_LEFT_OUT = 0.1  # share of the rows
 MAX_NUMBERED = 3  # columns name_1 … name_n beyond this may be samples: the mapping has to tell
 ROWS_A_CODE = 2  # at least, of a column that may name sensors, trials or runs
 MANY_TEXTS = 50  # different ones are no codes
-# Ratios of successive steps of a channel that make a word, of which so many may come twice; words that a slide keeps.
-WORD, MOST_AGAIN, MOST_WORDS = 20, 4, 1000
-WEIGHTS = 2 * np.random.default_rng(0).integers(2**62, size=WORD, dtype=np.uint64) + 1
+# Ratios of successive steps of a channel that make a word, of which a fifth may come twice; words that a slide keeps.
+# Of few levels, as a converter of 12 bits has, a robot that repeats itself to 0.3 of them gives 20 again by chance.
+WORD, COARSE_WORD, COARSE_LEVELS, MOST_WORDS = 20, 40, 4096, 1000
+WEIGHTS = 2 * np.random.default_rng(0).integers(2**62, size=COARSE_WORD, dtype=np.uint64) + 1
 # A vibration stands still if its samples are equal for longer, and is held by a slower sensor if fewer of its values
 # last one sample. In 1356 slides of public sets they are equal for 0.08 s at most, and at least 74 % last one sample.
 STILL_S, STILL_ROWS, FEWEST_SINGLE = 0.1, 10, 0.1
-CLOCK_ROWS = 100  # that rise one by one: of 48 000 channels in public sets none does but that of the time
+# A channel with more changes, of which a larger share go one way, is a clock or a counter: of 57 000 channels in public
+# sets at most 0.78 do but those of the time.
+CLOCK_CHANGES, ONE_WAY = 100, 0.9
 FLAGS = {'true', 'false', 'yes', 'no', 'on', 'off'}
 CODE_NAME = re.compile(
     r'(?:sensor|finger|trial|run|rep|repeat|repetition|recording|session|pass|stroke)s?[ _-]?(?:id|no|nr|number)?'
 )
 MAX_TURNS, IN_TURN = 100, 0.7  # sensors in turn, and share of rows with the number of as many rows before
 # Lowest and highest mean of a slide that a tactile finger reaches, in SI units.
-PLAUSIBLE: Mapping[str, tuple[float, float]] = {
-    'speed': (5e-5, 2.0), 'force': (1e-3, 100.0), 'direction': (-6.3, 6.3),
+PLAUSIBLE: Mapping[str, tuple[float, float, str]] = {
+    'speed': (5e-5, 2.0, '0.05 mm/s to 2 m/s'), 'force': (1e-3, 100.0, '1 mN to 100 N'),
+    'direction': (-6.3, 6.3, '-6.3 to 6.3 rad'),
 }  # fmt: skip
 
 
@@ -88,6 +91,7 @@ class ImportReport:
     rates_hz: dict[str, float] = field(default_factory=dict)
     conditions: dict[tuple[str, str], list[float]] = field(default_factory=lambda: defaultdict(list))
     left_out: Counter[str] = field(default_factory=Counter)  # by reason
+    kept: Counter[str] = field(default_factory=Counter)  # but to be looked at, by reason
     examples: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
     columns: dict[str, list[str]] = field(default_factory=dict)  # of each stream in the first file
     words: dict[int, str] = field(default_factory=dict)  # of channels, with the slide; see `refuse_copy`
@@ -106,7 +110,9 @@ class ImportReport:
         for signal, _ in streams.values():
             steps = np.abs(np.diff(signal.samples.astype(float), axis=0))
             # The sum tells slides apart whose channels have too few levels each.
-            words += [word for one in (*steps.T, steps.sum(axis=1)) for word in _words(one)]
+            lengths = [COARSE_WORD if _is_coarse(one) else WORD for one in signal.samples.T.astype(float)]
+            channels = zip((*steps.T, steps.sum(axis=1)), (*lengths, max(lengths)), strict=True)
+            words += [word for one, length in channels for word in _words(one, length)]
             sizes = np.rint(1e6 * steps / np.fmax.reduce(steps, axis=0, initial=1e-99)).T
             shapes += [min(hash(one.tobytes()), hash(one[::-1].tobytes())) for one in sizes]
         if sum(signal.samples.size for signal, _ in streams.values()) > 2 * WORD:
@@ -144,19 +150,23 @@ class ImportReport:
             names, rate_hz = self.channels[stream], self.rates_hz[stream]
             shown = names[0] if len(names) == 1 else f'{len(names)}: {names[0]} … {names[-1]}'
             spread = [_range(self.conditions.get((surface, name), ())) for name in named]
-            seconds = f'{counts["samples"] / rate_hz:.1f}'
             shown = f'1: {shown}' if shown.isdigit() else shown
-            table.append([surface, stream, str(self.slides[surface]), seconds, f'{rate_hz:g} Hz', shown,
-                          str(counts['lost']), str(counts['NaN']), *spread])  # fmt: skip
+            table.append([surface, stream, str(self.slides[surface]), f'{counts["samples"] / rate_hz:.1f}',
+                          f'{rate_hz:g} Hz', shown, str(counts['lost']), str(counts['NaN']), *spread])  # fmt: skip
         widths = [max(map(len, column)) for column in zip(*table, strict=True)]
         lines = ['  '.join(map(str.ljust, row, widths)).rstrip() for row in table]
         slides = sum(self.slides.values())
         found = f'{counted(slides, "slide")} over {counted(len(self.slides), "surface")}'
         total = f'{found} from {counted(self.files, "file")} of {counted(self.rows, "row")}'
-        lines.append(total + (f'; {self.with_nan} slides {NAN}' if self.with_nan else ''))
+        lines.append(
+            total
+            + (f'; {self.with_nan} slides have NaN samples, and windows with one are unusable' if self.with_nan else '')
+        )
         lines.append('left out: nothing' if not self.left_out else 'left out:')
         for reason, count in self.left_out.items():
             lines += [f'  {count} {reason}', *(f'    {example}' for example in self.examples[reason])]
+        lines += ['kept; check the sensor and the columns:'] * bool(self.kept)
+        lines += [f'  {count} {reason}' for reason, count in self.kept.items()]
         return lines
 
 
@@ -239,8 +249,11 @@ def _files(
         if path.is_dir() and not is_bag(path):
             parts = [one.name for one in path.iterdir() if 'bag' in kinds and one.suffix in ('.mcap', '.db3')]
             if fields is not None and (parts or path.suffix.lower() in kinds):
-                named = ', '.join(sorted(parts)[:3])
-                holds = f'; it holds {named} without metadata.yaml: ros2 bag reindex' if parts else ''
+                holds = (
+                    f'; it holds {", ".join(sorted(parts)[:3])} without metadata.yaml: ros2 bag reindex'
+                    if parts
+                    else ''
+                )
                 raise InvalidData(
                     f"'{place}' is a folder and no file{holds}; move it elsewhere, or correct `files` in the mapping"
                 )
@@ -329,9 +342,14 @@ class FrameSlides:
                 short += rows
                 self._report.leave_out('slides are too short', 1, f'{where}: {rows * reference.per_row} samples')
                 continue
-            if still := [fault for one in self._streams if (fault := _still(one, self._within(one, span, span_s)))]:
+            found = [(one, _flat(one.samples[self._within(one, span, span_s)], one.per_row)) for one in self._streams]
+            if still := [f"'{one.name}' {how}" for one, samples in found if (how := _still(one, samples))]:
                 self._report.leave_out(f'slides in which {still[0]}', 1, where)
                 continue
+            for one, samples in found:
+                for name, channel in zip(one.channels, samples.T, strict=True):
+                    if how := _still(one, channel[:, None]):
+                        self._report.kept[f"slides in which '{name}' of '{one.name}' {how}"] += 1
             yield self._slide(span, span_s, number)
         if short > MAX_LEFT_OUT * inside and short < inside and params.min_s == type(params).min_s:
             raise InvalidData(
@@ -351,8 +369,8 @@ class FrameSlides:
                 has = ', '.join(sorted({*texts.tolist()})[:5])
                 raise InvalidData(f"column '{name}' has no row '{value}'; it has {has}")
             good = np.flatnonzero(np.ones(len(mask)) if frame.junk is None else ~frame.junk)
-            between = (np.diff(good) > 1).any()  # behind the last good row nothing shifts
-            if between and any(not one.time.column for one in self._mapping.streams.values()):
+            # Behind the last good row nothing shifts.
+            if (np.diff(good) > 1).any() and any(not one.time.column for one in self._mapping.streams.values()):
                 line, reason = next(iter(frame.reasons.items()))
                 raise InvalidData(
                     f'row {line}, {reason}: of a malformed row nobody knows whether it is one of those under `rows`, '
@@ -542,10 +560,10 @@ class FrameSlides:
                 slide = np.searchsorted(edges, stream.rows, 'right')
                 steps = steps[slide[1:] == slide[:-1]]
             measured = per_row * estimated(steps)
-            if not measured:
+            if not measured or np.count_nonzero(steps < 0) > CLOCK_CHANGES:
                 raise InvalidData(
-                    f"the times of '{name}' do not grow from row to row; give a column of time that grows and has "
-                    'enough digits, or `rate_hz` in its place'
+                    f"the times of '{name}' do not grow from row to row; if rows are out of order, sort them by time, "
+                    'else give a column of time that grows and has enough digits, or `rate_hz` in its place'
                 )
         elif not (measured or params.rate_hz):
             raise InvalidData(f"'{name}' has no column of time and no rate; write time: {{column: NAME}}, or `rate_hz`")
@@ -617,6 +635,8 @@ class FrameSlides:
             if math.isfinite(mean):
                 self._report.conditions[surface, name].append(self._plausible(name, mean))
                 known[column] = mean
+            elif name in self._mapping.conditions:
+                self._report.kept[f'slides without {name}'] += 1
         lasts_s, speed_m_s = end_s - begin_s, known.get('speed_m_s', 0.0)
         if lasts_s > LONGEST_SLIDE_S or lasts_s * speed_m_s > LONGEST_TRACK_M:
             track = f' at {speed_m_s:.3g} m/s, so it has {lasts_s * speed_m_s:.3g} m' if speed_m_s else ''
@@ -630,8 +650,8 @@ class FrameSlides:
         streams = {one.name: self._samples(one, surface, rows, span_s) for one in self._streams}
         self._report.with_nan += any(np.isnan(signal.samples).any() for signal, _ in streams.values())
         self._report.slides[surface] += 1
-        name, motion = f'{self._place}/{number}', self._mapping.motion
-        state = ExplorationState(0, name, motion, Phase.SLIDE, surface=surface, **known)
+        place, motion = f'{self._place}/{number}', self._mapping.motion
+        state = ExplorationState(0, place, motion, Phase.SLIDE, surface=surface, **known)
         return session, [state], streams
 
     def _named(self, code: str) -> str:
@@ -691,10 +711,11 @@ class FrameSlides:
         """Refuse a channel that a bag, with 32 bits for a number, cannot hold, and one that is a clock."""
         known = samples[np.isfinite(samples).all(axis=1)]
         for channel, exact in zip(stream.channels, known.T, strict=True):
-            if len(exact) > CLOCK_ROWS and (np.diff(exact) > 0).all():
+            rising, falling = (np.count_nonzero(sign * np.diff(exact) > 0) for sign in (1, -1))
+            if rising + falling > CLOCK_CHANGES and max(rising, falling) > ONE_WAY * (rising + falling):
                 raise InvalidData(
-                    f"channel '{channel}' of '{stream.name}' rises from each sample to the next, as time or a counter "
-                    'does; leave it out of `columns`, or name it as the column of `time`'
+                    f"channel '{channel}' of '{stream.name}' rises {rising} times and falls {falling} times, as time, "
+                    'a counter or a position does; leave it out of `columns`, or name it as the column of `time`'
                 )
             spread, far = exact.std() if len(exact) else 0.0, abs(exact).max(initial=0.0)
             off = abs(exact.astype(np.float32) - exact).max(initial=0.0)
@@ -709,7 +730,7 @@ class FrameSlides:
 
     def _plausible(self, name: str, value: float) -> float:
         """Return the mean of a condition over a slide; InvalidData if no finger reaches it."""
-        low, high = PLAUSIBLE[name]
+        low, high, shown = PLAUSIBLE[name]
         if low <= value <= high:
             return value
         units = CONDITION_UNITS[name]
@@ -717,9 +738,8 @@ class FrameSlides:
         number = value / units[given]
         likely = [unit for unit, factor in units.items() if low <= number * factor <= high]
         raise InvalidData(
-            f'the {name} of a slide is {number:.4g} {given}, plausible are {low / units[given]:.3g} to '
-            f'{high / units[given]:.3g} {given}; leave out what is unknown, or look at its unit in the mapping'
-            + (f', which may be {" or ".join(likely)}' if likely else '')
+            f'the {name} of a slide is {number:.4g} {given}, plausible are {shown}; leave out what is unknown, or '
+            'look at its unit in the mapping' + (f', which may be {" or ".join(likely)}' if likely else '')
         )
 
     def _condition(self, name: str, rows: slice) -> float:
@@ -752,37 +772,44 @@ def _flat(samples: AnyArray, per_row: int) -> AnyArray:
     return samples.reshape(len(samples), -1, per_row).swapaxes(1, 2).reshape(len(samples) * per_row, -1)
 
 
-def _still(stream: Stream, within: slice) -> str:
-    """Return how the samples of some rows stand still, '' if they do not: of slow streams, only if none changes."""
-    samples = _flat(stream.samples[within], stream.per_row)
+def _still(stream: Stream, samples: AnyArray) -> str:
+    """Return how samples of a stream stand still, '' if they do not: of slow streams, only if none changes."""
     samples = samples[np.isfinite(samples).all(axis=1)]
     changes = np.flatnonzero((samples[1:] != samples[:-1]).any(axis=1))
     lasts = np.diff(np.concatenate(([-1], changes, [len(samples) - 1])))
     if len(lasts) == 1:
-        return f"no channel of '{stream.name}' changes" if len(samples) > 1 else ''
+        return 'does not change' if len(samples) > 1 else ''
     if stream.name == 'signal' and lasts.max() > max(STILL_ROWS, STILL_S * stream.rate_hz * stream.per_row):
-        return f"no channel of '{stream.name}' changes for over {STILL_S:g} s, as while a sensor is frozen"
+        return f'does not change for over {STILL_S:g} s, as while a sensor is frozen or the finger rests (cut rest off)'
     if stream.name == 'signal' and (lasts == 1).mean() < FEWEST_SINGLE:
-        return f"each sample of '{stream.name}' comes {np.median(lasts):g} times, as if a slower sensor were held"
+        return f'has each sample {np.median(lasts):g} times, as if a slower sensor were held'
     return ''
 
 
-def _words(steps: Array) -> list[int]:
-    """Return codes of the ratios of successive steps, (n,), `WORD` at a time: of a copy they are the same.
+def _is_coarse(samples: Array) -> bool:
+    """Return whether the samples of a channel are few even levels, as of a converter of at most 12 bits."""
+    levels = np.unique(samples[np.isfinite(samples)])
+    apart = np.diff(levels)
+    places = (levels - levels[:1]) / apart[apart < 1.5 * apart.min()].mean() if len(apart) else levels[:0]
+    return bool((places < COARSE_LEVELS).all() and (np.abs(places - np.rint(places)) < 0.1).all())
+
+
+def _words(steps: Array, length: int) -> list[int]:
+    """Return codes of the ratios of successive steps, (n,), `length` at a time: of a copy they are the same.
 
     An offset, a factor and the direction of time leave them. Left out are words of few levels, and such as come again
     within the slide: by chance or period other slides have them, too.
     """
     steps = steps[steps > 0]
-    if len(steps) <= WORD:
+    if len(steps) <= length:
         return []
     ratios = (1000 * np.abs(np.diff(np.log(steps)))).astype(np.uint64)
     order = np.argsort(ratios, kind='stable')
     again = np.zeros(len(ratios))
     again[order[1:]] = (np.diff(ratios[order]) == 0) & (np.diff(order) < WORD)
-    codes = np.minimum(np.correlate(ratios, WEIGHTS, 'valid'), np.convolve(ratios, WEIGHTS, 'valid'))
+    codes = np.minimum(*(fold(ratios, WEIGHTS[:length], 'valid') for fold in (np.correlate, np.convolve)))
     _, places, counts = np.unique(codes, return_inverse=True, return_counts=True)
-    return codes[(np.convolve(again, np.ones(WORD), 'valid') <= MOST_AGAIN) & (counts[places] == 1)].tolist()
+    return codes[(np.convolve(again, np.ones(length), 'valid') <= length // 5) & (counts[places] == 1)].tolist()
 
 
 def _is_one_of(text: str, wanted: Sequence[str]) -> bool:
