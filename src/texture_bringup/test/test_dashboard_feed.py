@@ -161,6 +161,15 @@ def test_a_finger_that_may_press_after_a_restart_of_the_explorer_is_a_warning_un
     assert feed.frame(0.0)['warning'] != ''
 
 
+def test_the_page_knows_whether_an_explorer_is_there() -> None:
+    feed = Feed()
+    assert not feed.frame(0.0)['explorer']
+    feed.node_statuses.update('explorer', 'WARN', 'it does not answer', 1.0)
+    assert feed.frame(1.0 + SILENT_S)['explorer'] and not feed.frame(1.1 + SILENT_S)['explorer']
+    feed.node_statuses.update('explorer', 'OK', 'finished', 9.0, ended=True)
+    assert not feed.frame(9.0)['explorer']
+
+
 ELSEWHERE = 'trained at one place of each surface: elsewhere it may be rejected'
 
 

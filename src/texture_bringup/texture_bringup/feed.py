@@ -54,6 +54,11 @@ class NodeStatuses:
         """Return level and message of the last status of a node; None if there is none."""
         return self._lights[name][:2] if name in self._lights else None
 
+    def reports(self, name: str, time_s: float) -> bool:
+        """Return whether a node is there."""
+        _, _, reported_s, ended = self._lights.get(name, ('', '', -math.inf, False))
+        return not ended and time_s - reported_s <= SILENT_S
+
     def shown(self, time_s: float) -> list[dict[str, str]]:
         """Return name, colour and message of each status indicator, by name."""
         found = []
@@ -265,6 +270,7 @@ class Feed:
         self._may_press = False  # since an exploration that was not seen to end with a lifted finger
         self.recorded = False  # the messages come from a bag, in which no node can report
         self.recording = ''  # folder that is being recorded to
+        self.fault = ''  # with which the last recording ended
         self.working = ''  # last message of a sub-command that the page has started
 
     @property
@@ -334,8 +340,10 @@ class Feed:
         """Return everything that is shown at a time of the monotonic clock, s, as JSON can carry it."""
         self._began_s = min(self._began_s, time_s)
         state, grade = self._state, self._roughness
+        pressing = MAY_PRESS * (self._may_press and state.phase is Phase.IDLE)  # of an explorer that was killed
         return {
-            'warning': MAY_PRESS * (self._may_press and state.phase is Phase.IDLE),  # an explorer that was killed
+            'warning': SEPARATOR.join(filter(None, (pressing, self.fault))),
+            'explorer': self.node_statuses.reports('explorer', time_s),
             'signal': self._signal(),
             'spectrum': self._spectrum(),
             'taxels': self._image(),

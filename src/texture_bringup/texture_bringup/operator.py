@@ -155,6 +155,7 @@ ACCEPT_S, CONFIRM_S = 15.0, 1.0
 # Time to find a service, and time for its answer: a tare takes up to 65 s, an arm up to 96 s to connect again.
 OFFERED_S, ANSWER_S = 10.0, 120.0
 STOP_S = 3.0
+CHOOSE = 'choose its namespace by --namespace, also of `texture dashboard`'
 EMERGENCY = 'if the arm moves, use the emergency stop of the robot'
 NOT_STOPPED = f'the explorer has not answered the stop within {STOP_S:g} s; {EMERGENCY}'
 SETTINGS_S = 10.0  # to find the parameters of a node
@@ -183,6 +184,7 @@ class ExplorationResult:
     texture: TextureEstimate
     roughness: RoughnessEstimate
     labels: tuple[str, ...] = ()  # of the probabilities
+    lifted: bool = False  # known to be free of the surface
 
     @property
     def success(self) -> bool:
@@ -261,7 +263,7 @@ class Operator:
                 raise
             raise LaunchFailed(
                 f"no explorer answers in the namespace '{ours}' (waited {deadline_s:.0f} s); there are explorers in "
-                f'{others}: give one as --namespace'
+                f'{others}: {CHOOSE}'
             ) from error
 
     def wait_for_node(self, name: str, deadline_s: float) -> None:
@@ -355,6 +357,7 @@ class Operator:
             from_msg(result.texture),
             from_msg(result.roughness),
             tuple(result.labels),
+            result.lifted,
         )
 
     def explore_with_features(
@@ -487,9 +490,7 @@ class Operator:
         if node not in self._settings:
             self._settings[node] = AsyncParameterClient(self._node, node)
         client = self._settings[node]
-        self.wait_until(
-            client.services_are_ready, SETTINGS_S, f"no node '{node}' answers; start it, or give its --namespace"
-        )
+        self.wait_until(client.services_are_ready, SETTINGS_S, f"no node '{node}' answers; start it, or {CHOOSE}")
         return client
 
     def _answer(self, node: str, future: Future) -> Any:

@@ -176,6 +176,16 @@ class Domain:
         name, rest = next(iter(self.rest.items()))
         return f'as quiet as the sensor at rest, {POWER.sub("", name)} {levels[name]:.3g}, at rest {rest:.3g}'
 
+    def quiet_slides(self, conditions: Iterable[SlideConditions], labels: Iterable[str]) -> dict[str, tuple[int, str]]:
+        """Return of each label with slides as quiet as the sensor at rest how many are, and that in a sentence."""
+        found: dict[str, tuple[int, str]] = {}
+        for label, made in zip(labels, conditions, strict=True):
+            if why := self.quiet(made):
+                number = found.get(label, (0, ''))[0] + 1
+                of_all = f"{number} of {self.slides[label]} slides of '{label}' are {why}"
+                found[label] = number, f'{of_all}: {UNFELT}; rejected; {LOUDER}'
+        return found
+
 
 def _places(slides: Sequence[SlideConditions], labels: Sequence[str]) -> int:
     """Return the number of places or sessions of the label that has most; one session per slide counts as one."""

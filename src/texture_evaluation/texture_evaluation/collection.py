@@ -20,6 +20,7 @@ from texture_core.config import param
 from texture_core.errors import CollectionError, ExplorationError, InvalidData, InvalidParameter, TextureError
 from texture_core.types import Array, ExplorationRequest, checked_label
 from texture_estimation.acceptance import LEAST_SLIDES_A_LABEL
+from texture_estimation.domain import Domain
 from texture_estimation.learners.discriminant import Discriminant
 from texture_estimation.recipe import load_recipe
 from texture_estimation.training import train
@@ -207,6 +208,7 @@ class PlaceAccuracy:
     confused: str = ''
     others: int = 0
     bands: tuple[Band, ...] = ()
+    quiet: str = ''  # if each slide is as quiet as the sensor at rest: a training rejects the surface
 
     @property
     def bound(self) -> float:
@@ -249,6 +251,11 @@ def evaluate_places(features: LabelledFeatures, surface: str) -> PlaceAccuracy:
     """Return accuracy and acceptance at the places of a surface, each left out in turn with those near to it."""
     made = {name: features.conditions.get(name, SlideConditions()) for name in np.unique(features.groups).tolist()}
     surfaces = dict(zip(features.groups.tolist(), features.labels.tolist(), strict=True))
+    labels_of = [surfaces[name] for name in made]
+    domain = Domain.of_slides(made.values(), labels_of)
+    quiet, silent = domain.quiet_slides(made.values(), labels_of).get(surface, (0, ''))
+    if quiet and quiet == domain.slides[surface]:
+        return PlaceAccuracy(0, 0, quiet=silent)
     at: dict[str, list[str]] = {}
     for name in (name for name in made if surfaces[name] == surface):
         at.setdefault(made[name].place or name, []).append(name)
@@ -349,6 +356,8 @@ def collect(
             if slides % EVERY and slides not in (params.places, params.most_places):
                 continue
             accuracy = evaluate_all()
+            if accuracy.quiet:
+                break
             fewer = max(0, slides - accuracy.places)
             tell(f'{accuracy.sentence}{f"; {fewer} {UNCOUNTED}" * bool(fewer)}', slides)
             # The first surface of a folder has nothing to be distinguished from.
@@ -365,7 +374,7 @@ def collect(
         if accuracy.confused
         else 'allow more places'
     )
-    return ended(CollectionError.BOUND_MISSED, accuracy.sentence + missing)
+    return ended(CollectionError.BOUND_MISSED, accuracy.quiet or accuracy.sentence + missing)
 
 
 def next_bag(folder: Path, surface: str) -> Path:
