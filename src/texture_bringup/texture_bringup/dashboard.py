@@ -178,10 +178,8 @@ class Recorder:
     def watch(self) -> None:
         """Note a recording that ended on an error."""
         if self._child is not None and self._child.end:
-            self.fault = (
-                f"the recording to '{self.bag}' has ended: {self._child.end}; the output of all nodes is in "
-                f'{self._child.log}'
-            )
+            end, log = self._child.end, self._child.log
+            self.fault = f"the recording to '{self.bag}' has ended: {end}; the output of all nodes is in {log}"
             self._child, self.bag = None, ''
 
 

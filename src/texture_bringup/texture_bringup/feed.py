@@ -54,13 +54,8 @@ class NodeStatuses:
         """Return level and message of the last status of a node; None if there is none."""
         return self._lights[name][:2] if name in self._lights else None
 
-    def reports(self, name: str, time_s: float) -> bool:
-        """Return whether a node is there."""
-        _, _, reported_s, ended = self._lights.get(name, ('', '', -math.inf, False))
-        return not ended and time_s - reported_s <= SILENT_S
-
-    def shown(self, time_s: float) -> list[dict[str, str]]:
-        """Return name, colour and message of each status indicator, by name."""
+    def shown(self, time_s: float) -> list[dict[str, Any]]:
+        """Return name, colour and message of each status indicator, by name, and whether its node is there."""
         found = []
         for name, (level, message, reported_s, ended) in sorted(self._lights.items()):
             colour, text = COLOURS.get(level, 'red'), message
@@ -69,7 +64,7 @@ class NodeStatuses:
             elif time_s - reported_s > SILENT_S:
                 colour, text = 'red', f'silent for {time_s - reported_s:.0f} s; its last message: {message}'
                 text += f'; {PRESSES}' * (name == 'explorer')
-            found.append({'name': name, 'colour': colour, 'message': text})
+            found.append({'name': name, 'colour': colour, 'message': text, 'there': text == message})
         return found
 
 
@@ -197,13 +192,6 @@ def in_words(value: IntEnum) -> str:
     return value.name.lower().replace('_', ' ')
 
 
-def label_text(estimate: TextureEstimate) -> str:
-    """Return the label as text: one that must not be used carries a question mark and why, 'felt?, rejected: novel'."""
-    if estimate.accepted:
-        return estimate.label
-    return f'{estimate.label}?, rejected: {in_words(estimate.rejection)}' if estimate.label else ''
-
-
 def texture_text(estimate: TextureEstimate) -> str:
     """Return a texture estimate as text; of a rejected one first the reason, then what else the classifier notes."""
     if not estimate.label and not estimate.windows:
@@ -312,7 +300,8 @@ class Feed:
 
     def on_texture(self, estimate: TextureEstimate) -> None:
         """Take an estimate; one of an exploration before the present one only enters its summary."""
-        self._note(estimate.exploration_id, {'label': label_text(estimate) or 'no label'})
+        rejected = '' if estimate.accepted else f'?, rejected: {in_words(estimate.rejection)}'
+        self._note(estimate.exploration_id, {'label': f'{estimate.label}{rejected}' if estimate.label else 'no label'})
         if estimate.exploration_id == self._texture.exploration_id or not self._texture.exploration_id:
             self._texture = estimate
 
@@ -343,9 +332,11 @@ class Feed:
         pressing = MAY_PRESS * (self._may_press and state.phase is Phase.IDLE)  # of an explorer that was killed
         return {
             'warning': SEPARATOR.join(filter(None, (pressing, self.fault))),
-            'explorer': self.node_statuses.reports('explorer', time_s),
             'signal': self._signal(),
-            'spectrum': self._spectrum(),
+            'spectrum': {
+                'db': _numbers(spectrum_db(self._ring.newest(SPECTRUM_S), BINS)),
+                'high_hz': self._ring.last.sampling_rate_hz / 2 if self._ring.last else 0.0,
+            },
             'taxels': self._image(),
             'state': {
                 **_shown(state),
@@ -379,10 +370,6 @@ class Feed:
             'high': _numbers(high),
             'length_s': SIGNAL_S,
         }
-
-    def _spectrum(self) -> dict[str, Any]:
-        levels = spectrum_db(self._ring.newest(SPECTRUM_S), BINS)
-        return {'db': _numbers(levels), 'high_hz': self._ring.last.sampling_rate_hz / 2 if self._ring.last else 0.0}
 
     def _image(self) -> dict[str, Any]:
         taxels = self._taxels

@@ -78,10 +78,7 @@ def uninterrupted() -> Iterator[None]:
         raise KeyboardInterrupt
 
 
-def middleware() -> str:
-    """Return the name of the implementation of ROS that is used."""
-    return str(get_rmw_implementation_identifier())
-
+middleware = get_rmw_implementation_identifier  # a function: the name of the implementation of ROS that is used
 
 # --------------------
 # Parameters of a node from texts, by the types that the node has declared.
@@ -367,7 +364,15 @@ class Operator:
         stopped: Callable[[], bool] = lambda: False,
     ) -> tuple[ExplorationResult, list[FeatureVector]]:
         """Explore as `explore` does, and also return the features of the windows; none of an aborted exploration."""
-        vectors = self._listen_to_features()
+        if self._vectors is None:  # listen from now on
+            heard = self._vectors = []
+            self._node.create_subscription(
+                msg.FeatureVector, 'features', lambda message: heard.append(from_msg(message)), FEATURE_QOS
+            )
+            missing = "no node publishes on 'features'; is the feature_extractor running?"
+            self.wait_until(lambda: self._node.count_publishers('features') > 0, FEATURES_DEADLINE_S, missing)
+            self._complete(Future(), DISCOVERY_S)
+        vectors = self._vectors
         vectors.clear()
         explored = self.explore(request, on_progress, stopped)
         if not explored.success:
@@ -430,20 +435,6 @@ class Operator:
         while True:
             self._step()
             show()
-
-    def _listen_to_features(self) -> list[FeatureVector]:
-        """Return the list to which feature vectors are added as they arrive, once their topic has a publisher."""
-        if self._vectors is not None:
-            return self._vectors
-        vectors: list[FeatureVector] = []
-        self._vectors = vectors
-        self._node.create_subscription(
-            msg.FeatureVector, 'features', lambda message: vectors.append(from_msg(message)), FEATURE_QOS
-        )
-        missing = "no node publishes on 'features'; is the feature_extractor running?"
-        self.wait_until(lambda: self._node.count_publishers('features') > 0, FEATURES_DEADLINE_S, missing)
-        self._complete(Future(), DISCOVERY_S)
-        return vectors
 
     def _ask_classifier(self, kind: Any, name: str, request: Any) -> Any:
         """Return the answer of a service of the classifier that succeeded."""

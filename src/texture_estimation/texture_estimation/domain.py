@@ -176,15 +176,16 @@ class Domain:
         name, rest = next(iter(self.rest.items()))
         return f'as quiet as the sensor at rest, {POWER.sub("", name)} {levels[name]:.3g}, at rest {rest:.3g}'
 
-    def quiet_slides(self, conditions: Iterable[SlideConditions], labels: Iterable[str]) -> dict[str, tuple[int, str]]:
-        """Return of each label with slides as quiet as the sensor at rest how many are, and that in a sentence."""
-        found: dict[str, tuple[int, str]] = {}
-        for label, made in zip(labels, conditions, strict=True):
-            if why := self.quiet(made):
-                number = found.get(label, (0, ''))[0] + 1
-                of_all = f"{number} of {self.slides[label]} slides of '{label}' are {why}"
-                found[label] = number, f'{of_all}: {UNFELT}; rejected; {LOUDER}'
-        return found
+    def with_quiet(self, conditions: Iterable[SlideConditions], labels: Iterable[str]) -> tuple[Domain, dict[str, str]]:
+        """Return the domain with its quiet labels, and a sentence on each label with slides as quiet as at rest."""
+        quiet = [(label, why) for label, made in zip(labels, conditions, strict=True) if (why := self.quiet(made))]
+        counts = Counter(label for label, _ in quiet)
+        sentences = {
+            label: f"{counts[label]} of {self.slides[label]} slides of '{label}' are {why}: {UNFELT}; rejected; {LOUDER}"
+            for label, why in quiet
+        }
+        silent = tuple(label for label in counts if counts[label] == self.slides[label])
+        return replace(self, quiet_labels=silent), sentences
 
 
 def _places(slides: Sequence[SlideConditions], labels: Sequence[str]) -> int:

@@ -388,9 +388,7 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
         speed_margin=recipe.training.speed_margin,
         force_margin=recipe.training.force_margin,
     )
-    quiet = domain.quiet_slides(conditions, of_slides)
-    silenced = tuple(label for label, (number, _) in quiet.items() if number == domain.slides[label])
-    domain = replace(domain, quiet_labels=silenced)
+    domain, quiet = domain.with_quiet(conditions, of_slides)
     silent = ', '.join(recipe.feature_set.unknown_levels)
     unknown = (
         f'no feature is the power of {silent}' if silent else f'no approach of {LEAST_AT_REST} samples was recorded'
@@ -434,7 +432,7 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
             'hop_s': examples.hop_s,
             'calibration': calibrated.note,
             'held_out_window_accuracy': accuracy,
-            'quiet': [sentence for _, sentence in quiet.values()]
+            'quiet': list(quiet.values())
             if domain.rest
             else [f'{unknown}: a finger that feels nothing cannot be told from a quiet surface'],
         },

@@ -251,11 +251,10 @@ def evaluate_places(features: LabelledFeatures, surface: str) -> PlaceAccuracy:
     """Return accuracy and acceptance at the places of a surface, each left out in turn with those near to it."""
     made = {name: features.conditions.get(name, SlideConditions()) for name in np.unique(features.groups).tolist()}
     surfaces = dict(zip(features.groups.tolist(), features.labels.tolist(), strict=True))
-    labels_of = [surfaces[name] for name in made]
-    domain = Domain.of_slides(made.values(), labels_of)
-    quiet, silent = domain.quiet_slides(made.values(), labels_of).get(surface, (0, ''))
-    if quiet and quiet == domain.slides[surface]:
-        return PlaceAccuracy(0, 0, quiet=silent)
+    labels = [surfaces[name] for name in made]
+    domain, quiet = Domain.of_slides(made.values(), labels).with_quiet(made.values(), labels)
+    if surface in domain.quiet_labels:
+        return PlaceAccuracy(0, 0, quiet=quiet[surface])
     at: dict[str, list[str]] = {}
     for name in (name for name in made if surfaces[name] == surface):
         at.setdefault(made[name].place or name, []).append(name)

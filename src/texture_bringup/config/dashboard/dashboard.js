@@ -291,8 +291,9 @@ function showRest(frame) {
   phase = frame.state.phase;
   warning = frame.warning;
   restarted = restarted && !frame.state.lifted;
-  if (frame.explorer && !explorer && answered === asked) say(''); // what was answered is of an earlier one
-  explorer = frame.explorer;
+  const there = frame.lights.some((light) => light.name === 'explorer' && light.there);
+  if (there && !explorer && answered === asked) say(''); // what was answered is of an earlier one
+  explorer = there;
   showBanner();
   if (stopping && phase === 'idle') {
     stopping = false;

@@ -103,12 +103,7 @@ class DashboardNode(Node):
             if not result.exploration_id:
                 raise MotionRefused(result.message, result.error)
             stopped_well = result.lifted and result.error in (ExplorationError.STOPPED, ExplorationError.CANCELLED)
-            return {
-                'success': result.success,
-                'stopped': stopped_well,
-                'message': result.message,
-                'id': result.exploration_id,
-            }
+            return {'success': result.success, 'stopped': stopped_well, 'message': result.message}
 
         with self._until_stopped() as stopped:
             return await self._operate(explore)
@@ -235,9 +230,7 @@ class DashboardNode(Node):
 
     async def _call(self, service: str, advice: str) -> Mapping[str, Any]:
         success, message = await self._operate(lambda operator: operator.call(service, advice))
-        if not success:
-            raise MotionRefused(message)
-        return {'success': True, 'message': message}
+        return {'success': success, 'message': message}
 
     async def _operate(self, work: Callable[[Operator], T]) -> T:
         """Let an operator do something in another thread; it is left when the page closes."""
