@@ -350,7 +350,7 @@ def test_a_recording_that_was_killed_is_named_with_its_cause_until_the_next_begi
     recorder.watch()
     feed.fault = recorder.fault
     ended = f"the recording to '{tmp_path}/now' has ended: the recorder was killed by SIGKILL; the output of all nodes"
-    assert feed.frame(0.0)['warning'] == f'{ended} is in {tmp_path}/now.log'
+    assert feed.frame(0.0)['fault'] == f'{ended} is in {tmp_path}/now.log'
     assert recorder.bag == ''
     recorder.begin('later')
     assert recorder.fault == ''

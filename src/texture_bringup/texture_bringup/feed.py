@@ -301,7 +301,8 @@ class Feed:
     def on_texture(self, estimate: TextureEstimate) -> None:
         """Take an estimate; one of an exploration before the present one only enters its summary."""
         rejected = '' if estimate.accepted else f'?, rejected: {in_words(estimate.rejection)}'
-        self._note(estimate.exploration_id, {'label': f'{estimate.label}{rejected}' if estimate.label else 'no label'})
+        label = f'{estimate.label}{rejected}' if estimate.label else 'no label'
+        self._note(estimate.exploration_id, {'label': label})
         if estimate.exploration_id == self._texture.exploration_id or not self._texture.exploration_id:
             self._texture = estimate
 
@@ -329,9 +330,9 @@ class Feed:
         """Return everything that is shown at a time of the monotonic clock, s, as JSON can carry it."""
         self._began_s = min(self._began_s, time_s)
         state, grade = self._state, self._roughness
-        pressing = MAY_PRESS * (self._may_press and state.phase is Phase.IDLE)  # of an explorer that was killed
         return {
-            'warning': SEPARATOR.join(filter(None, (pressing, self.fault))),
+            'warning': MAY_PRESS * (self._may_press and state.phase is Phase.IDLE),  # an explorer that was killed
+            'fault': self.fault,
             'signal': self._signal(),
             'spectrum': {
                 'db': _numbers(spectrum_db(self._ring.newest(SPECTRUM_S), BINS)),

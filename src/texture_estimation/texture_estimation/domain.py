@@ -180,12 +180,9 @@ class Domain:
         """Return the domain with its quiet labels, and a sentence on each label with slides as quiet as at rest."""
         quiet = [(label, why) for label, made in zip(labels, conditions, strict=True) if (why := self.quiet(made))]
         counts = Counter(label for label, _ in quiet)
-        sentences = {
-            label: f"{counts[label]} of {self.slides[label]} slides of '{label}' are {why}: {UNFELT}; rejected; {LOUDER}"
-            for label, why in quiet
-        }
-        silent = tuple(label for label in counts if counts[label] == self.slides[label])
-        return replace(self, quiet_labels=silent), sentences
+        of, remedy = self.slides, f'{UNFELT}; rejected; {LOUDER}'
+        sentences = {one: f"{counts[one]} of {of[one]} slides of '{one}' are {why}: {remedy}" for one, why in quiet}
+        return replace(self, quiet_labels=tuple(one for one in counts if counts[one] == of[one])), sentences
 
 
 def _places(slides: Sequence[SlideConditions], labels: Sequence[str]) -> int:

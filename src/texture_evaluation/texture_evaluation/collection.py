@@ -251,8 +251,8 @@ def evaluate_places(features: LabelledFeatures, surface: str) -> PlaceAccuracy:
     """Return accuracy and acceptance at the places of a surface, each left out in turn with those near to it."""
     made = {name: features.conditions.get(name, SlideConditions()) for name in np.unique(features.groups).tolist()}
     surfaces = dict(zip(features.groups.tolist(), features.labels.tolist(), strict=True))
-    labels = [surfaces[name] for name in made]
-    domain, quiet = Domain.of_slides(made.values(), labels).with_quiet(made.values(), labels)
+    slides = made.values(), [surfaces[name] for name in made]
+    domain, quiet = Domain.of_slides(*slides).with_quiet(*slides)
     if surface in domain.quiet_labels:
         return PlaceAccuracy(0, 0, quiet=quiet[surface])
     at: dict[str, list[str]] = {}

@@ -42,6 +42,7 @@ let run = ''; // of the dashboard: another after each start
 let restarted = false; // and no finger was lifted since
 let explorer = true; // whether it is there
 let warning = ''; // of the nodes
+let fault = ''; // of the last recording
 let phase = '';
 let stopping = false; // until the idle state says whether the finger was lifted
 let newest = ''; // id of the last exploration
@@ -49,10 +50,10 @@ let curve = { id: '', points: [] };
 
 const showBanner = () => {
   const taken = foreign && `this address now belongs to another dashboard (${foreign}): reload the page`;
-  const now = [answer[0], answer[0].includes(warning) ? '' : warning, restarted && RESTARTED];
+  const now = [answer[0], answer[0].includes(warning) ? '' : warning, restarted && RESTARTED, fault];
   const text = (live ? now : [taken, LOST, answer[1] && answer[0]]).filter(Boolean).join(' · ');
   at('banner').textContent = text;
-  at('banner').className = !live || answer[1] || warning || restarted ? 'banner bad' : 'banner';
+  at('banner').className = !live || answer[1] || warning || restarted || fault ? 'banner bad' : 'banner';
   at('banner').hidden = !text;
 };
 const say = (text, bad = false) => {
@@ -289,7 +290,7 @@ function showFrame(frame) {
 
 function showRest(frame) {
   phase = frame.state.phase;
-  warning = frame.warning;
+  ({ warning, fault } = frame);
   restarted = restarted && !frame.state.lifted;
   const there = frame.lights.some((light) => light.name === 'explorer' && light.there);
   if (there && !explorer && answered === asked) say(''); // what was answered is of an earlier one
