@@ -158,7 +158,7 @@ class Wire:
             async with aiohttp.ClientSession() as session, session.ws_connect(f'{self._address}ws') as frames:
                 async for frame in frames:
                     newest = json.loads(frame.data)
-                    if condition(newest):
+                    if 'lights' in newest and condition(newest):  # the first message names the dashboard
                         return
 
         try:
