@@ -89,6 +89,10 @@ def test_the_slide_before_an_exploration_that_never_slid_is_not_added_in_its_pla
     graph.until(publisher.get_subscription_count)
     assert publisher.wait_for_all_acked()
     assert asked(graph, 'add', 'silk') == 2
+    assert "'stopped-2' is still running; wait for its end" in capsys.readouterr().err
+    publisher.publish(to_msg(ExplorationState(1, '', '', Phase.IDLE)))
+    assert publisher.wait_for_all_acked()
+    assert asked(graph, 'add', 'silk') == 2
     assert "'stopped-2' has no usable window: it ended before its slide" in capsys.readouterr().err
     assert asked(graph, 'add', 'silk', 'slide-1') == 0
     classify_slide(graph, 'stopped-3')

@@ -218,7 +218,7 @@ def test_a_failing_node_and_a_silent_one_are_red() -> None:
         'explorer': 'green',
     }
     silent = {light['name']: light for light in node_statuses.shown(SILENT_S + 1)}
-    assert {light['colour'] for light in silent.values()} == {'red'}
+    assert {(light['colour'], light['there']) for light in silent.values()} == {('red', False)}
     assert silent['explorer']['message'].startswith('silent for 6 s; its last message: the arm answers; the arm may')
     assert 'the arm may continue to press' not in silent['sensor']['message']
     for number in range(200):
@@ -229,10 +229,10 @@ def test_a_failing_node_and_a_silent_one_are_red() -> None:
 def test_a_node_that_ended_well_is_grey_until_it_is_started_again() -> None:
     lights = NodeStatuses()
     lights.update('record', 'OK', '12 messages recorded, nothing lost', 0.0, ended=True)
-    ended = {'name': 'record', 'colour': 'grey', 'message': 'ended: 12 messages recorded, nothing lost'}
+    ended = {'name': 'record', 'colour': 'grey', 'message': 'ended: 12 messages recorded, nothing lost', 'there': False}
     assert lights.shown(1.0) == lights.shown(SILENT_S + 100.0) == [ended]
     lights.update('record', 'WARN', '3 lost samples', 200.0, ended=True)
     assert lights.shown(300.0)[0]['colour'] == 'yellow'
     lights.update('record', 'OK', 'recording', 301.0)
-    assert lights.shown(302.0)[0]['colour'] == 'green'
+    assert (lights.shown(302.0)[0]['colour'], lights.shown(302.0)[0]['there']) == ('green', True)
     assert lights.shown(302.0 + SILENT_S)[0]['colour'] == 'red'

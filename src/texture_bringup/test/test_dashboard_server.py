@@ -4,6 +4,8 @@ import asyncio
 import json
 import re
 import socket
+import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -12,6 +14,8 @@ from aiohttp.test_utils import TestClient, TestServer
 
 from texture_bringup import dashboard
 from texture_bringup.dashboard import BUTTONS, MAX_BODY_BYTES, VIEWERS, Access, Guesses, Recorder, Serving, make_app
+from texture_bringup.feed import Feed
+from texture_bringup.launcher import ChildLauncher
 from texture_core.errors import InvalidParameter, LaunchFailed, MotionRefused
 
 PAGE = Path(__file__).parents[1] / 'config' / 'dashboard'
@@ -22,6 +26,8 @@ POST = b'POST /api/stop HTTP/1.1\r\nHost: localhost\r\nContent-Type: application
 
 class Nodes:
     """What the page's buttons reach, without nodes."""
+
+    identity = 'namespace /<a>, ROS domain 1, user 0 of robot'
 
     def __init__(self):
         self.asked = []
@@ -132,9 +138,38 @@ def test_a_request_that_is_too_large_broken_or_of_another_page_is_refused_and_re
     with_client(story)
 
 
+def test_a_page_knows_its_dashboard_and_another_one_takes_no_command_from_it() -> None:
+    async def story(client, nodes):
+        assert (
+            'data-dashboard="namespace /&lt;a&gt;, ROS domain 1, user 0 of robot"'
+            in await (await client.get('/')).text()
+        )
+        other = await client.post('/api/stop', params={'dashboard': 'namespace /b'}, json={})
+        sentence = f'this address now belongs to another dashboard ({Nodes.identity}): reload the page'
+        assert (other.status, (await other.json())['message'], nodes.asked) == (409, sentence, [])
+        ours = await client.post('/api/stop', params={'dashboard': Nodes.identity}, json={})
+        assert (ours.status, nodes.asked) == (200, [{}])
+
+    with_client(story)
+
+
+def test_each_start_of_a_dashboard_is_told_from_the_one_before() -> None:
+    runs = []
+
+    async def story(client, _nodes):
+        for _ in range(2):
+            async with client.ws_connect('/ws') as page:
+                runs.append((await page.receive_json())['run'])
+
+    with_client(story)
+    with_client(story)
+    assert runs[0] == runs[1] != runs[2] == runs[3]
+
+
 def test_the_web_socket_sends_the_newest_frame_and_is_closed_to_other_pages() -> None:
     async def story(client, _nodes):
         async with client.ws_connect('/ws') as page:
+            assert (await page.receive_json())['dashboard'] == Nodes.identity
             client.app[VIEWERS].show('{"number": 1}')
             assert await page.receive_json() == {'number': 1}
         answer = await client.get('/ws', headers={'Origin': 'http://evil.example', 'Upgrade': 'websocket'})
@@ -149,7 +184,7 @@ def test_a_page_that_does_not_read_misses_frames_and_keeps_nobody_waiting() -> N
             for number in range(200):
                 client.app[VIEWERS].show(json.dumps({'number': number, 'rest': 'x' * 100_000}))
                 await asyncio.sleep(0)
-            while (await quick.receive_json())['number'] < 199:
+            while (await quick.receive_json()).get('number', 0) < 199:
                 pass
             assert not slow.closed
 
@@ -271,6 +306,7 @@ def test_the_server_ends_while_a_page_is_open() -> None:
 
     async def watch():
         async with ClientSession() as session, session.ws_connect(f'http://127.0.0.1:{serving.port}/ws') as page:
+            assert (await page.receive_json())['run']
             serving.show('{}')
             assert await page.receive_json() == {}
             closing = asyncio.create_task(asyncio.to_thread(serving.close))
@@ -278,6 +314,46 @@ def test_the_server_ends_while_a_page_is_open() -> None:
             await closing  # raises if the loop of the server still runs
 
     asyncio.run(asyncio.wait_for(watch(), DEADLINE_S))
+
+
+def test_what_a_button_has_begun_is_over_when_the_server_is_closed() -> None:
+    begun, over = threading.Event(), threading.Event()
+
+    def work():
+        begun.set()
+        time.sleep(2.0)  # longer than requests are waited for
+        over.set()
+        return {'success': True, 'message': ''}
+
+    class Slow(Nodes):
+        async def explore(self, asked):
+            return await asyncio.get_running_loop().run_in_executor(None, work)
+
+    serving = Serving(make_app(Slow(), Access('127.0.0.1'), PAGE), '127.0.0.1', 0)
+    with socket.create_connection(('127.0.0.1', serving.port), timeout=DEADLINE_S) as line:
+        line.sendall(POST.replace(b'stop', b'explore') + b'Content-Length: 2\r\n\r\n{}')
+        assert begun.wait(DEADLINE_S)
+        serving.close()
+    assert over.is_set()
+
+
+def test_a_recording_that_was_killed_is_named_with_its_cause_until_the_next_begins(tmp_path, monkeypatch) -> None:
+    class Killed(ChildLauncher):
+        end = 'the recorder was killed by SIGKILL'
+
+        def __enter__(self):
+            return self
+
+    monkeypatch.setattr(dashboard, 'ChildLauncher', Killed)
+    recorder, feed = Recorder(tmp_path, '/'), Feed()
+    recorder.begin('now')
+    recorder.watch()
+    feed.fault = recorder.fault
+    ended = f"the recording to '{tmp_path}/now' has ended: the recorder was killed by SIGKILL; the output of all nodes"
+    assert feed.frame(0.0)['fault'] == f'{ended} is in {tmp_path}/now.log'
+    assert recorder.bag == ''
+    recorder.begin('later')
+    assert recorder.fault == ''
 
 
 def test_what_cannot_be_recorded_is_reported_and_nothing_is_left_to_end(tmp_path) -> None:

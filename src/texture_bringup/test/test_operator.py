@@ -82,7 +82,10 @@ def test_a_wrong_namespace_is_named_with_those_that_have_an_explorer():
     with LocalGraph(DOMAIN) as graph, operators.Operator('lefft', DOMAIN) as operator:
         for namespace in ('left', 'right'):
             graph.add(partial(rclpy.create_node, 'explorer', namespace=namespace))
-        with pytest.raises(LaunchFailed, match=r"in the namespace '/lefft' .* explorers in /left, /right"):
+        with pytest.raises(
+            LaunchFailed,
+            match=r"in the namespace '/lefft' .* explorers in /left, /right: choose .* also of `texture dashboard`",
+        ):
             operator.wait_for_explorer(5.0)
 
 
@@ -103,7 +106,8 @@ def test_an_aborted_exploration_says_that_the_finger_was_lifted_if_that_is_known
     result = msg.ExplorationResult(error_code=code, message=message, exploration_id='a', lifted=lifted)
     with silent_explorer(result=result), operators.Operator(domain_id=DOMAIN) as operator:
         operator.wait_for_explorer(30.0)
-        assert operator.explore(ExplorationRequest('linear_slide')).message == f'the explorer was {ending}'
+        ended = operator.explore(ExplorationRequest('linear_slide'))
+        assert (ended.message, ended.lifted) == (f'the explorer was {ending}', lifted)
 
 
 def test_an_explorer_that_does_not_keep_the_timeout_is_left(monkeypatch):

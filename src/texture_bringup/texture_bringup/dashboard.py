@@ -8,6 +8,7 @@ import asyncio
 import concurrent.futures
 import contextlib
 import hmac
+import html
 import ipaddress
 import json
 import os
@@ -177,7 +178,8 @@ class Recorder:
     def watch(self) -> None:
         """Note a recording that ended on an error."""
         if self._child is not None and self._child.end:
-            self.fault = f'{self._child.end}; the output of all nodes is in {self._child.log}'
+            end, log = self._child.end, self._child.log
+            self.fault = f"the recording to '{self.bag}' has ended: {end}; the output of all nodes is in {log}"
             self._child, self.bag = None, ''
 
 
@@ -212,7 +214,8 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 class Viewers:
     """The newest frame for all viewers; a slow viewer misses frames and delays no other."""
 
-    def __init__(self) -> None:
+    def __init__(self, hello: str) -> None:
+        self._hello = hello  # the first message to each
         self._frame = ''
         self._number = 0
         self.sockets: set[web.WebSocketResponse] = set()
@@ -230,6 +233,7 @@ class Viewers:
         await socket.prepare(request)
         self.sockets.add(socket)
         try:
+            await socket.send_str(self._hello)
             while not socket.closed:
                 if sent != self._number:
                     sent = self._number
@@ -251,9 +255,13 @@ BUSY: web.AppKey[set[Any]] = web.AppKey('busy', set)  # connections whose reques
 
 
 def make_app(commands: Any, access: Access, page: Path) -> web.Application:
-    """Return the application, which is not started yet."""
+    """Return the application, which is not started yet.
+
+    `commands.identity` names the nodes behind the page: an open page of others gets no frame and reaches no node.
+    """
+    identity = commands.identity
     app = web.Application(middlewares=[_guard(access)], client_max_size=MAX_BODY_BYTES)
-    viewers = app[VIEWERS] = Viewers()
+    viewers = app[VIEWERS] = Viewers(json.dumps({'dashboard': identity, 'run': secrets.token_hex(8)}))
     app[BUSY] = set()
 
     async def motions(_request: web.Request) -> web.StreamResponse:
@@ -261,7 +269,7 @@ def make_app(commands: Any, access: Access, page: Path) -> web.Application:
 
     async def static(request: web.Request) -> web.StreamResponse:
         file, kind = PAGE[request.path]
-        text = (page / file).read_text(encoding='utf-8')
+        text = (page / file).read_text(encoding='utf-8').replace('$DASHBOARD', html.escape(identity))
         return web.Response(text=text, content_type=kind, charset='utf-8')
 
     async def secure(_request: web.Request, response: web.StreamResponse) -> None:
@@ -274,7 +282,7 @@ def make_app(commands: Any, access: Access, page: Path) -> web.Application:
     app.router.add_get('/ws', viewers.watch)
     app.router.add_get('/api/motions', motions)
     for name in BUTTONS:
-        app.router.add_post(f'/api/{name}', _command(getattr(commands, name)))
+        app.router.add_post(f'/api/{name}', _command(getattr(commands, name), identity))
     for path in PAGE:
         app.router.add_get(path, static)
     app.on_response_prepare.append(secure)
@@ -322,7 +330,7 @@ def _refusal(access: Access, guesses: Guesses, request: web.Request) -> web.Stre
     return None
 
 
-def _command(command: Callable[[Mapping[str, Any]], Awaitable[Answer]]) -> Handler:
+def _command(command: Callable[[Mapping[str, Any]], Awaitable[Answer]], identity: str) -> Handler:
     async def act(request: web.Request) -> web.StreamResponse:
         # Another page could send a form without asking; it cannot send JSON.
         if request.content_type != 'application/json':
@@ -337,6 +345,8 @@ def _command(command: Callable[[Mapping[str, Any]], Awaitable[Answer]]) -> Handl
         if not isinstance(asked, dict):
             return _failure(400, 'the request is not a JSON object')
         try:
+            if request.query.get('dashboard', identity) != identity:
+                raise InvalidParameter(f'this address now belongs to another dashboard ({identity}): reload the page')
             return web.json_response(await command(asked))
         except TextureError as error:
             return _failure(409, str(error))
@@ -350,8 +360,6 @@ def _failure(status: int, message: str) -> web.Response:
 
 # --------------------
 # The web server in a separate thread of the process.
-
-SERVING_CLOSING_S = 5.0
 
 
 class Serving:
@@ -386,9 +394,9 @@ class Serving:
         self._loop.call_soon_threadsafe(self._app[VIEWERS].show, frame)
 
     def close(self) -> None:
-        """Close all connections, and join the thread."""
+        """Close all connections, and join the thread and its workers: none may use ROS while that is shut down."""
         self._loop.call_soon_threadsafe(self._closing.set)
-        self._thread.join(SERVING_CLOSING_S)
+        self._thread.join()
         self._loop.close()
 
     async def _serve(self, host: str, port: int) -> None:
@@ -404,6 +412,7 @@ class Serving:
             self._started.set_exception(error)
         finally:
             await runner.cleanup()
+            await self._loop.shutdown_default_executor()
 
     async def _close_silent(self, runner: web.AppRunner) -> None:
         """Close each connection whose next request does not come in time."""

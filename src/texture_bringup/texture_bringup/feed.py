@@ -54,8 +54,8 @@ class NodeStatuses:
         """Return level and message of the last status of a node; None if there is none."""
         return self._lights[name][:2] if name in self._lights else None
 
-    def shown(self, time_s: float) -> list[dict[str, str]]:
-        """Return name, colour and message of each status indicator, by name."""
+    def shown(self, time_s: float) -> list[dict[str, Any]]:
+        """Return name, colour and message of each status indicator, by name, and whether its node is there."""
         found = []
         for name, (level, message, reported_s, ended) in sorted(self._lights.items()):
             colour, text = COLOURS.get(level, 'red'), message
@@ -64,7 +64,7 @@ class NodeStatuses:
             elif time_s - reported_s > SILENT_S:
                 colour, text = 'red', f'silent for {time_s - reported_s:.0f} s; its last message: {message}'
                 text += f'; {PRESSES}' * (name == 'explorer')
-            found.append({'name': name, 'colour': colour, 'message': text})
+            found.append({'name': name, 'colour': colour, 'message': text, 'there': text == message})
         return found
 
 
@@ -192,13 +192,6 @@ def in_words(value: IntEnum) -> str:
     return value.name.lower().replace('_', ' ')
 
 
-def label_text(estimate: TextureEstimate) -> str:
-    """Return the label as text: one that must not be used carries a question mark and why, 'felt?, rejected: novel'."""
-    if estimate.accepted:
-        return estimate.label
-    return f'{estimate.label}?, rejected: {in_words(estimate.rejection)}' if estimate.label else ''
-
-
 def texture_text(estimate: TextureEstimate) -> str:
     """Return a texture estimate as text; of a rejected one first the reason, then what else the classifier notes."""
     if not estimate.label and not estimate.windows:
@@ -265,6 +258,7 @@ class Feed:
         self._may_press = False  # since an exploration that was not seen to end with a lifted finger
         self.recorded = False  # the messages come from a bag, in which no node can report
         self.recording = ''  # folder that is being recorded to
+        self.fault = ''  # with which the last recording ended
         self.working = ''  # last message of a sub-command that the page has started
 
     @property
@@ -306,7 +300,9 @@ class Feed:
 
     def on_texture(self, estimate: TextureEstimate) -> None:
         """Take an estimate; one of an exploration before the present one only enters its summary."""
-        self._note(estimate.exploration_id, {'label': label_text(estimate) or 'no label'})
+        rejected = '' if estimate.accepted else f'?, rejected: {in_words(estimate.rejection)}'
+        label = f'{estimate.label}{rejected}' if estimate.label else 'no label'
+        self._note(estimate.exploration_id, {'label': label})
         if estimate.exploration_id == self._texture.exploration_id or not self._texture.exploration_id:
             self._texture = estimate
 
@@ -336,8 +332,12 @@ class Feed:
         state, grade = self._state, self._roughness
         return {
             'warning': MAY_PRESS * (self._may_press and state.phase is Phase.IDLE),  # an explorer that was killed
+            'fault': self.fault,
             'signal': self._signal(),
-            'spectrum': self._spectrum(),
+            'spectrum': {
+                'db': _numbers(spectrum_db(self._ring.newest(SPECTRUM_S), BINS)),
+                'high_hz': self._ring.last.sampling_rate_hz / 2 if self._ring.last else 0.0,
+            },
             'taxels': self._image(),
             'state': {
                 **_shown(state),
@@ -371,10 +371,6 @@ class Feed:
             'high': _numbers(high),
             'length_s': SIGNAL_S,
         }
-
-    def _spectrum(self) -> dict[str, Any]:
-        levels = spectrum_db(self._ring.newest(SPECTRUM_S), BINS)
-        return {'db': _numbers(levels), 'high_hz': self._ring.last.sampling_rate_hz / 2 if self._ring.last else 0.0}
 
     def _image(self) -> dict[str, Any]:
         taxels = self._taxels

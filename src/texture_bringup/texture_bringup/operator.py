@@ -78,10 +78,7 @@ def uninterrupted() -> Iterator[None]:
         raise KeyboardInterrupt
 
 
-def middleware() -> str:
-    """Return the name of the implementation of ROS that is used."""
-    return str(get_rmw_implementation_identifier())
-
+middleware = get_rmw_implementation_identifier  # a function: the name of the implementation of ROS that is used
 
 # --------------------
 # Parameters of a node from texts, by the types that the node has declared.
@@ -155,6 +152,7 @@ ACCEPT_S, CONFIRM_S = 15.0, 1.0
 # Time to find a service, and time for its answer: a tare takes up to 65 s, an arm up to 96 s to connect again.
 OFFERED_S, ANSWER_S = 10.0, 120.0
 STOP_S = 3.0
+CHOOSE = 'choose its namespace by --namespace, also of `texture dashboard`'
 EMERGENCY = 'if the arm moves, use the emergency stop of the robot'
 NOT_STOPPED = f'the explorer has not answered the stop within {STOP_S:g} s; {EMERGENCY}'
 SETTINGS_S = 10.0  # to find the parameters of a node
@@ -183,6 +181,7 @@ class ExplorationResult:
     texture: TextureEstimate
     roughness: RoughnessEstimate
     labels: tuple[str, ...] = ()  # of the probabilities
+    lifted: bool = False  # known to be free of the surface
 
     @property
     def success(self) -> bool:
@@ -261,7 +260,7 @@ class Operator:
                 raise
             raise LaunchFailed(
                 f"no explorer answers in the namespace '{ours}' (waited {deadline_s:.0f} s); there are explorers in "
-                f'{others}: give one as --namespace'
+                f'{others}: {CHOOSE}'
             ) from error
 
     def wait_for_node(self, name: str, deadline_s: float) -> None:
@@ -355,6 +354,7 @@ class Operator:
             from_msg(result.texture),
             from_msg(result.roughness),
             tuple(result.labels),
+            result.lifted,
         )
 
     def explore_with_features(
@@ -364,7 +364,15 @@ class Operator:
         stopped: Callable[[], bool] = lambda: False,
     ) -> tuple[ExplorationResult, list[FeatureVector]]:
         """Explore as `explore` does, and also return the features of the windows; none of an aborted exploration."""
-        vectors = self._listen_to_features()
+        if self._vectors is None:  # listen from now on
+            heard = self._vectors = []
+            self._node.create_subscription(
+                msg.FeatureVector, 'features', lambda message: heard.append(from_msg(message)), FEATURE_QOS
+            )
+            missing = "no node publishes on 'features'; is the feature_extractor running?"
+            self.wait_until(lambda: self._node.count_publishers('features') > 0, FEATURES_DEADLINE_S, missing)
+            self._complete(Future(), DISCOVERY_S)
+        vectors = self._vectors
         vectors.clear()
         explored = self.explore(request, on_progress, stopped)
         if not explored.success:
@@ -428,20 +436,6 @@ class Operator:
             self._step()
             show()
 
-    def _listen_to_features(self) -> list[FeatureVector]:
-        """Return the list to which feature vectors are added as they arrive, once their topic has a publisher."""
-        if self._vectors is not None:
-            return self._vectors
-        vectors: list[FeatureVector] = []
-        self._vectors = vectors
-        self._node.create_subscription(
-            msg.FeatureVector, 'features', lambda message: vectors.append(from_msg(message)), FEATURE_QOS
-        )
-        missing = "no node publishes on 'features'; is the feature_extractor running?"
-        self.wait_until(lambda: self._node.count_publishers('features') > 0, FEATURES_DEADLINE_S, missing)
-        self._complete(Future(), DISCOVERY_S)
-        return vectors
-
     def _ask_classifier(self, kind: Any, name: str, request: Any) -> Any:
         """Return the answer of a service of the classifier that succeeded."""
         missing = 'no classifier answers; is it running?'
@@ -487,9 +481,7 @@ class Operator:
         if node not in self._settings:
             self._settings[node] = AsyncParameterClient(self._node, node)
         client = self._settings[node]
-        self.wait_until(
-            client.services_are_ready, SETTINGS_S, f"no node '{node}' answers; start it, or give its --namespace"
-        )
+        self.wait_until(client.services_are_ready, SETTINGS_S, f"no node '{node}' answers; start it, or {CHOOSE}")
         return client
 
     def _answer(self, node: str, future: Future) -> Any:

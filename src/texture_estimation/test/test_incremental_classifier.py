@@ -128,7 +128,7 @@ def test_a_slide_is_added_once_it_has_ended_and_no_earlier_one_in_its_place(mode
     *windows, end = slide_of(model, silk, 'second')
     for vector in windows:
         classifier.observe(vector)
-    with pytest.raises(InvalidData, match="'second' still runs"):
+    with pytest.raises(InvalidData, match=r"'second' is still running; wait for its end$"):
         classifier.add('silk')
     classifier.observe(end)
     classifier.add('silk')
@@ -150,6 +150,11 @@ def test_what_cannot_be_trained_is_refused_with_a_sentence(model, silk, measured
     with pytest.raises(InvalidData, match='no label'):
         classifier.add('  ')
     classifier.begin('stopped-early')
+    with pytest.raises(
+        InvalidData, match=r"'stopped-early' is still running; wait for its end$"
+    ):  # it has not slid yet
+        classifier.add('silk')
+    classifier.end('stopped-early', aborted=False)
     with pytest.raises(InvalidData, match=r"'stopped-early' has no usable window: it ended before its slide .*: e1$"):
         classifier.add('silk')
 
@@ -159,7 +164,7 @@ def test_an_aborted_slide_is_refused_by_name_and_others_can_be_added(model, silk
     measured(classifier, silk)
     classifier.begin('stopped')
     measured(classifier, silk[:1], 'stopped')
-    classifier.abort('stopped')
+    classifier.end('stopped', aborted=True)
     for name in ('', 'stopped'):
         with pytest.raises(ChangeRefused, match=r"'stopped' was aborted, .*; explore again\. Can be added: e1$"):
             classifier.add('silk', name)

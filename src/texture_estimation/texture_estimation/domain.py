@@ -178,6 +178,14 @@ class Domain:
         name, rest = next(iter(self.rest.items()))
         return f'as quiet as the sensor at rest, {POWER.sub("", name)} {levels[name]:.3g}, at rest {rest:.3g}'
 
+    def with_quiet(self, conditions: Iterable[SlideConditions], labels: Iterable[str]) -> tuple[Domain, dict[str, str]]:
+        """Return the domain with its quiet labels, and a sentence on each label with slides as quiet as at rest."""
+        quiet = [(label, why) for label, made in zip(labels, conditions, strict=True) if (why := self.quiet(made))]
+        counts = Counter(label for label, _ in quiet)
+        of, remedy = self.slides, f'{UNFELT}; rejected; {LOUDER}'
+        sentences = {one: f"{counts[one]} of {of[one]} slides of '{one}' are {why}: {remedy}" for one, why in quiet}
+        return replace(self, quiet_labels=tuple(one for one in counts if counts[one] == of[one])), sentences
+
 
 def _places(slides: Sequence[SlideConditions], labels: Sequence[str]) -> int:
     """Return the number of places or sessions of the label that has most; one session per slide counts as one."""

@@ -58,16 +58,19 @@ class IncrementalClassifier:
         self._recent_windows: OrderedDict[str, list[Array]] = OrderedDict()
         self._conditions: dict[str, RunningConditions] = {}  # of the same explorations
         self._aborted: set[str] = set()  # of them
-        self._sliding: str | None = None  # the exploration whose end has not come
+        self._running: str | None = None  # the exploration that has not ended
+        self._sliding: str | None = None  # the one whose last window has not come
 
     def begin(self, exploration_id: str) -> None:
         """Note an exploration as the newest one: if it ends before it slides, no earlier one takes its place."""
-        self._sliding = None
+        self._running, self._sliding = exploration_id, None
         self._recent_windows_of(exploration_id)
 
-    def abort(self, exploration_id: str) -> None:
-        """Note an exploration as aborted, so that it is not added."""
-        self._aborted.add(exploration_id)
+    def end(self, exploration_id: str, *, aborted: bool) -> None:
+        """Note that no exploration runs any more; an aborted one is not added."""
+        self._running = None
+        if aborted:
+            self._aborted.add(exploration_id)
 
     def observe(self, vector: FeatureVector) -> None:
         """Keep a window, so that its exploration can be added."""
@@ -85,8 +88,8 @@ class IncrementalClassifier:
         if not label:
             raise ChangeRefused('no label was given; name the texture to add', ChangeError.INVALID_LABEL)
         name = exploration_id or next(reversed(self._recent_windows), '')
-        if name == self._sliding:
-            raise ChangeRefused(f"exploration '{name}' still runs; add it once it has ended", ChangeError.NO_SLIDE)
+        if name in (self._running, self._sliding):
+            raise ChangeRefused(f"exploration '{name}' is still running; wait for its end", ChangeError.NO_SLIDE)
         self._refuse_without_window(name)
         self._refuse_second_time(name, label)
         added_slide = AddedSlide(label, name, np.stack(self._recent_windows[name]), self._conditions[name].get())

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -17,7 +16,7 @@ from scipy.optimize import minimize_scalar
 from texture_core.errors import InvalidData
 from texture_core.types import AnyArray, Array
 from texture_estimation.acceptance import Acceptance, HeldOutSlide
-from texture_estimation.domain import LOUDER, UNFELT, Domain
+from texture_estimation.domain import Domain
 from texture_estimation.evidence_rules import EvidenceRule, followed
 from texture_estimation.gaussians import ClassDistance, compared_start
 from texture_estimation.learners.learner import (
@@ -389,9 +388,7 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
         speed_margin=recipe.training.speed_margin,
         force_margin=recipe.training.force_margin,
     )
-    quiet = [(label, why) for label, made in zip(of_slides, conditions, strict=True) if (why := domain.quiet(made))]
-    counts = Counter(label for label, _ in quiet)
-    domain = replace(domain, quiet_labels=tuple(label for label in counts if counts[label] == domain.slides[label]))
+    domain, quiet = domain.with_quiet(conditions, of_slides)
     silent = ', '.join(recipe.feature_set.unknown_levels)
     unknown = (
         f'no feature is the power of {silent}' if silent else f'no approach of {LEAST_AT_REST} samples was recorded'
@@ -435,11 +432,7 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
             'hop_s': examples.hop_s,
             'calibration': calibrated.note,
             'held_out_window_accuracy': accuracy,
-            'quiet': [
-                f"{counts[label]} of {domain.slides[label]} slides of '{label}' are {why}: {UNFELT}; rejected; "
-                + LOUDER
-                for label, why in dict(quiet).items()
-            ]
+            'quiet': list(quiet.values())
             if domain.rest
             else [f'{unknown}: a finger that feels nothing cannot be told from a quiet surface'],
         },
@@ -460,6 +453,10 @@ def adapted(model: TextureModel, training: LabelledFeatures, today: LabelledFeat
     if strange := sorted(set(today.labels.tolist()) - set(labels)):
         raise InvalidData(
             f"'{strange[0]}' is not a trained surface; label the slides of today with {', '.join(labels)}"
+        )
+    if missing := sorted(set(labels) - set(training.labels.tolist())):
+        raise InvalidData(
+            f"the model was also trained on '{missing[0]}', of which the bags of the training hold no slide; give all"
         )
     shifts: dict[str, Array] = {
         label: today.values[today.labels == label].mean(axis=0) - training.values[training.labels == label].mean(axis=0)

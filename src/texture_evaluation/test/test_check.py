@@ -10,7 +10,7 @@ import pytest
 from texture_core.errors import InvalidData
 from texture_core.types import ExplorationRequest, Phase
 from texture_estimation.model import load_model
-from texture_evaluation.check import check_finger, store_reference
+from texture_evaluation.check import adapt_to_today, check_finger, store_reference
 from texture_evaluation.train import train_from_bags
 from texture_features.correction import read_reference
 from texture_features.feature_set import FeatureSet
@@ -170,6 +170,21 @@ def test_the_reference_tells_how_its_slide_was_made(trained):
         'speed_m_s': 0.03, 'force_n': 5.0, 'distance_m': 0.08, 'direction_rad': 0.5
     }  # fmt: skip
     assert check(model, slides[2])[0]
+
+
+def test_slides_of_the_training_are_none_of_today_and_the_training_has_to_be_whole(trained, tmp_path):
+    model, bags = trained[0], trained[0].parent / 'bags'
+    with pytest.raises(
+        InvalidData, match=r"^6 of the 6 slides of today are slides of the training, the first 'glass/1'"
+    ):
+        adapt_to_today(model, [bags], [bags / 'glass'])
+    with pytest.raises(InvalidData, match=r'^6 of the 6 slides of today'):  # whatever is given as training
+        adapt_to_today(model, [bags / 'leather'], [bags / 'glass'])
+    [today] = write_simulated(tmp_path, replace(PLAN, slides=1), np.random.default_rng(1), surfaces=('glass',))
+    with pytest.raises(
+        InvalidData, match="also trained on 'cardboard', of which the bags of the training hold no slide; give all"
+    ):
+        adapt_to_today(model, [bags / 'leather', bags / 'glass'], [today])
 
 
 def test_a_reference_is_stored_only_if_a_second_slide_shows_the_same(trained):

@@ -127,6 +127,34 @@ def features(shift_of_place, n_places=6, spacing_mm=15):
     )
 
 
+POWER = 'signal/moments/signal_log_power/pac'
+
+
+def test_a_surface_as_quiet_as_the_sensor_at_rest_ends_the_collection_with_the_sentence_of_the_training():
+    def quiet(oak_level):
+        found = features(lambda place: 0.0)
+        levels = {'oak': oak_level, 'felt': 40.0}
+        conditions = {
+            name: replace(one, levels=((POWER, *[levels[name.split('/')[0]]] * 3),), rest=((POWER, 10.0),))
+            for name, one in found.conditions.items()
+        }
+        return replace(found, conditions=conditions)
+
+    plan, moved = PlacePlan('oak', PARAMS, PATCH), []
+
+    def explore(request):
+        moved.append(request)
+        return ExplorationError.NONE, ''
+
+    end = collect(plan, PARAMS, explore, lambda: evaluate_places(quiet(10.0), 'oak'), lambda *_: None)
+    assert (end.error, len(moved)) == (CollectionError.BOUND_MISSED, 3)
+    assert end.message == (
+        "6 of 6 slides of 'oak' are as quiet as the sensor at rest, signal/pac 10, at rest 10: a finger that feels "
+        'nothing shows the same; rejected; slide faster, press harder, or use a finer sensor, and train so'
+    )
+    assert evaluate_places(quiet(30.0), 'oak').quiet == ''
+
+
 def test_left_out_places_are_correct_or_misidentified_as_another_surface():
     found = evaluate_places(features(lambda place: 0.0), 'oak')
     assert (found.places, found.correct, found.confused, found.others) == (6, 6, '', 1)

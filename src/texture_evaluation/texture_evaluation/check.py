@@ -15,7 +15,7 @@ from texture_core.errors import InvalidData
 from texture_core.types import NANOSECONDS, ExplorationRequest
 from texture_estimation.model import load_model, model_stem
 from texture_estimation.training import DAY_SUFFIX, adapted
-from texture_evaluation.train import training_examples
+from texture_evaluation.train import slide_digest, training_examples
 from texture_features.correction import (
     CORRECTION,
     GAIN_DB,
@@ -143,7 +143,14 @@ def adapt_to_today(model: str | Path, bags: Sequence[str | Path], today: Sequenc
     trained = load_model(model)
     feature_set, out = trained.recipe.feature_set, f'{model_stem(model)}{DAY_SUFFIX}'
     shots = SlideDataset.from_bags(today, topics=feature_set.topics)
-    examples = training_examples(trained.recipe, SlideDataset.from_bags(bags, topics=feature_set.topics))
+    slides = SlideDataset.from_bags(bags, topics=feature_set.topics)
+    known = {*map(slide_digest, slides), *trained.training.get('slide_digests', ())}
+    if again := [slide.name for slide in shots if slide_digest(slide) in known]:
+        raise InvalidData(
+            f"{len(again)} of the {len(shots)} slides of today are slides of the training, the first '{again[0]}'; "
+            'give bags that hold slides of today alone'
+        )
+    examples = training_examples(trained.recipe, slides)
     today_model = adapted(trained, examples, shots.features(feature_set))
     today_model.save(out)
     return (

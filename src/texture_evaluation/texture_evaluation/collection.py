@@ -20,6 +20,7 @@ from texture_core.config import param
 from texture_core.errors import CollectionError, ExplorationError, InvalidData, InvalidParameter, TextureError, counted
 from texture_core.types import Array, ExplorationRequest, checked_label
 from texture_estimation.acceptance import LEAST_SLIDES_A_LABEL
+from texture_estimation.domain import Domain
 from texture_estimation.learners.discriminant import Discriminant
 from texture_estimation.recipe import load_recipe
 from texture_estimation.training import train
@@ -207,6 +208,7 @@ class PlaceAccuracy:
     confused: str = ''
     others: int = 0
     bands: tuple[Band, ...] = ()
+    quiet: str = ''  # if each slide is as quiet as the sensor at rest: a training rejects the surface
 
     @property
     def bound(self) -> float:
@@ -249,6 +251,10 @@ def evaluate_places(features: LabelledFeatures, surface: str) -> PlaceAccuracy:
     """Return accuracy and acceptance at the places of a surface, each left out in turn with those near to it."""
     made = {name: features.conditions.get(name, SlideConditions()) for name in np.unique(features.groups).tolist()}
     surfaces = dict(zip(features.groups.tolist(), features.labels.tolist(), strict=True))
+    slides = made.values(), [surfaces[name] for name in made]
+    domain, quiet = Domain.of_slides(*slides).with_quiet(*slides)
+    if surface in domain.quiet_labels:
+        return PlaceAccuracy(0, 0, quiet=quiet[surface])
     at: dict[str, list[str]] = {}
     for name in (name for name in made if surfaces[name] == surface):
         at.setdefault(made[name].place or name, []).append(name)
@@ -349,6 +355,8 @@ def collect(
             if slides % EVERY and slides not in (params.places, params.most_places):
                 continue
             accuracy = evaluate_all()
+            if accuracy.quiet:
+                break
             fewer = max(0, slides - accuracy.places)
             tell(f'{accuracy.sentence}{f"; {fewer} {UNCOUNTED}" * bool(fewer)}', slides)
             # The first surface of a folder has nothing to be distinguished from.
@@ -365,7 +373,7 @@ def collect(
         if accuracy.confused
         else 'allow more places'
     )
-    return ended(CollectionError.BOUND_MISSED, accuracy.sentence + missing)
+    return ended(CollectionError.BOUND_MISSED, accuracy.quiet or accuracy.sentence + missing)
 
 
 def next_bag(folder: Path, surface: str) -> Path:

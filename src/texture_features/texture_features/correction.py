@@ -297,8 +297,8 @@ def read_reference(model: str | Path) -> tuple[dict[str, InputStatistics], dict[
     path = file_next_to(model, REFERENCE)
     if not path.exists():
         raise ModelMismatch(
-            f"no reference is stored: '{path}' does not exist; slide over the reference plate with the finger that the "
-            f'model was trained with, and store that slide by `texture check {model} --store`'
+            f"no reference is stored: '{path}' does not exist; if that is the model, slide over the reference plate "
+            f'with the finger that it was trained with, and store that slide by `texture check {model} --store`'
         )
     try:
         content = load_json(path, MOST_BYTES)

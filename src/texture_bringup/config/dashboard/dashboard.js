@@ -24,6 +24,9 @@ const DOING = {
   check: 'checking the finger …',
   collect: 'collecting …',
 };
+// Nodes that were started again know nothing of a finger that was left on the surface.
+const RESTARTED = 'the dashboard was started again, and the finger may still press: look at the robot; this stays until an exploration or `texture lift` succeeds';
+const DASHBOARD = document.documentElement.dataset.dashboard;
 const at = (id) => document.getElementById(id);
 let replaying = null;
 const kept = new Map(); // what was shown of each exploration that is listed: texts, every how many, how many came
@@ -33,16 +36,24 @@ let answer = ['', false]; // to the last button, and whether it is bad
 let unanswered = false; // that none came is what is shown
 let asked = 0; // number of the last request
 let answered = 0; // number of the last one that was answered
+let stopped = 0; // number of the last stop
+let foreign = ''; // the dashboard that has taken over this address
+let run = ''; // of the dashboard: another after each start
+let restarted = false; // and no finger was lifted since
+let explorer = true; // whether it is there
 let warning = ''; // of the nodes
+let fault = ''; // of the last recording
 let phase = '';
 let stopping = false; // until the idle state says whether the finger was lifted
 let newest = ''; // id of the last exploration
 let curve = { id: '', points: [] };
 
 const showBanner = () => {
-  const text = (live ? [answer[0], answer[0].includes(warning) ? '' : warning] : [LOST, answer[1] && answer[0]]).filter(Boolean).join(' · ');
+  const taken = foreign && `this address now belongs to another dashboard (${foreign}): reload the page`;
+  const now = [answer[0], answer[0].includes(warning) ? '' : warning, restarted && RESTARTED, fault];
+  const text = (live ? now : [taken, LOST, answer[1] && answer[0]]).filter(Boolean).join(' · ');
   at('banner').textContent = text;
-  at('banner').className = !live || answer[1] || warning ? 'banner bad' : 'banner';
+  at('banner').className = !live || answer[1] || warning || restarted || fault ? 'banner bad' : 'banner';
   at('banner').hidden = !text;
 };
 const say = (text, bad = false) => {
@@ -279,7 +290,11 @@ function showFrame(frame) {
 
 function showRest(frame) {
   phase = frame.state.phase;
-  warning = frame.warning;
+  ({ warning, fault } = frame);
+  restarted = restarted && !frame.state.lifted;
+  const there = frame.lights.some((light) => light.name === 'explorer' && light.there);
+  if (there && !explorer && answered === asked) say(''); // what was answered is of an earlier one
+  explorer = there;
   showBanner();
   if (stopping && phase === 'idle') {
     stopping = false;
@@ -337,16 +352,18 @@ function replay(id) {
 async function ask(name, body) {
   const moving = phase && !ENDED.includes(phase);
   const number = ++asked;
-  if (name !== 'stop') stopping = false;
+  if (name === 'stop') stopped = number;
+  else stopping = false;
   say(body.undo ? 'removing the slide that was added last …' : DOING[name]);
   try {
-    const answer = await fetch(`api/${name}`, {
+    const answer = await fetch(`api/${name}?dashboard=${encodeURIComponent(DASHBOARD)}`, {
       method: 'POST', headers: { 'Content-Type': 'application/json' }, body: JSON.stringify(body),
     });
     const reply = await answer.json();
     answered = Math.max(answered, number);
+    if (number < stopped) return; // the answer to the stop stays
     if (name === 'stop') stopping = moving && reply.success;
-    say(reply.message, !reply.success);
+    say(reply.message, !reply.success && !reply.stopped);
   } catch (error) {
     if (number < answered) return; // a later request was answered since
     say(`'${name}' got no answer: ${error.message}`, true);
@@ -375,12 +392,9 @@ function numberField(number) {
 
 function connect() {
   const socket = new WebSocket(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws`);
-  socket.onopen = () => {
-    if (unanswered) say(''); // from now on the state is known
-    loadMotions().catch(() => say('the list of motions did not arrive; reload the page', true));
-  };
   socket.onmessage = (message) => {
     const frame = JSON.parse(message.data);
+    if (frame.dashboard) return void greet(socket, frame);
     last = Date.now();
     live = true;
     keep(frame.state, message.data);
@@ -389,8 +403,21 @@ function connect() {
   };
   socket.onclose = () => {
     showLost();
-    window.setTimeout(connect, RETRY_MS);
+    if (!foreign) window.setTimeout(connect, RETRY_MS);
   };
+}
+
+// The first message: whose dashboard it is, and whether it was started again since the last connection.
+function greet(socket, hello) {
+  if (hello.dashboard !== DASHBOARD) {
+    foreign = hello.dashboard;
+    document.querySelectorAll('button').forEach((button) => { button.disabled = true; });
+    return void socket.close();
+  }
+  restarted = restarted || (run !== '' && run !== hello.run);
+  run = hello.run;
+  if (unanswered) say(''); // from now on the state is known
+  loadMotions().catch(() => say('the list of motions did not arrive; reload the page', true));
 }
 
 // What was shown last is no longer known: no number, and no green node.

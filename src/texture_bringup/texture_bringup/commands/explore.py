@@ -560,9 +560,13 @@ def _configure_check(parser: argparse.ArgumentParser) -> None:
 
 def _check(options: argparse.Namespace) -> int:
     """Check, store or adapt; return 1 if the finger is not as trained and was not corrected."""
+    from texture_features.correction import read_reference
+
+    # Report what is missing before large packages are imported, and before the robot moves.
+    compares = not (options.store or options.today or options.trained)
+    reference, made = read_reference(options.model) if compares else ({}, {})
     from texture_estimation.model import load_model
     from texture_evaluation.check import adapt_to_today, check_finger, store_reference
-    from texture_features.correction import read_reference
     from texture_recordings.dataset import SlideDataset
 
     if options.today or options.trained:
@@ -570,9 +574,7 @@ def _check(options: argparse.Namespace) -> int:
             raise InvalidParameter('--today and --trained need each other: slides of today, and those of the training')
         print(adapt_to_today(options.model, options.trained, options.today))
         return 0
-    # Report what is missing before the robot moves.
     topics = load_model(options.model).recipe.feature_set.topics
-    reference, made = ({}, {}) if options.store else read_reference(options.model)
     request = plate_request(options, made)
     with tempfile.TemporaryDirectory() as folder:
         bag = Path(folder) / 'plate'

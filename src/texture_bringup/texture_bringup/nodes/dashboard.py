@@ -7,7 +7,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import os
 import signal
+import socket
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -25,7 +27,7 @@ from texture_bringup.dashboard import Access, Recorder, Serving, make_app
 from texture_bringup.feed import FRAME_PERIOD_S, Feed, number_text
 from texture_bringup.operator import NOT_STOPPED, STOP_S, Operator, subscribe
 from texture_core.config import folder, from_mapping, param
-from texture_core.errors import InvalidData, InvalidParameter, LaunchFailed, MotionRefused
+from texture_core.errors import ExplorationError, InvalidData, InvalidParameter, LaunchFailed, MotionRefused
 from texture_core.ros import DiagnosticReport, Diagnostics, declare, quality_of_service, run
 from texture_core.types import ExplorationRequest, checked_label
 from texture_features.correction import read_reference
@@ -58,6 +60,10 @@ class DashboardNode(Node):
         self._info = msg.ExplorerInfo()
         self._bad = 0
         self._closing = False
+        self.identity = (
+            f'namespace {self.get_namespace()}, ROS domain {self.context.get_domain_id()}, '
+            f'user {os.getuid()} of {socket.gethostname()}'
+        )
         self._recordings = Path(params.recordings).expanduser()
         self._command: asyncio.subprocess.Process | None = None
         self._moving: set[object] = set()  # what was asked for since the last stop, until it is over
@@ -96,7 +102,8 @@ class DashboardNode(Node):
             result = operator.explore(request, stopped=stopped)
             if not result.exploration_id:
                 raise MotionRefused(result.message, result.error)
-            return {'success': result.success, 'message': result.message, 'id': result.exploration_id}
+            stopped_well = result.lifted and result.error in (ExplorationError.STOPPED, ExplorationError.CANCELLED)
+            return {'success': result.success, 'stopped': stopped_well, 'message': result.message}
 
         with self._until_stopped() as stopped:
             return await self._operate(explore)
@@ -177,7 +184,7 @@ class DashboardNode(Node):
 
     def _show(self) -> None:
         self._recorder.watch()
-        self._feed.recording = self._recorder.bag
+        self._feed.recording, self._feed.fault = self._recorder.bag, self._recorder.fault
         if self._serving.watched:
             self._serving.show(json.dumps(self._feed.frame(time.monotonic()), allow_nan=False))
 
@@ -223,9 +230,7 @@ class DashboardNode(Node):
 
     async def _call(self, service: str, advice: str) -> Mapping[str, Any]:
         success, message = await self._operate(lambda operator: operator.call(service, advice))
-        if not success:
-            raise MotionRefused(message)
-        return {'success': True, 'message': message}
+        return {'success': success, 'message': message}
 
     async def _operate(self, work: Callable[[Operator], T]) -> T:
         """Let an operator do something in another thread; it is left when the page closes."""

@@ -176,12 +176,14 @@ class Classifier(EstimatorNode):
         return replace(super()._predict(vector), revision=self._revision)
 
     def _on_state(self, state: msg.ExplorationState) -> None:
-        exploration_id, before = state.exploration_id, self._exploration_id
+        exploration_id, before, aborted = state.exploration_id, self._exploration_id, state.PHASE_ABORTED
         self._exploration_id = exploration_id or before
-        if self._incremental_classifier is not None and exploration_id not in ('', before):
+        if self._incremental_classifier is None:
+            return
+        if exploration_id not in ('', before):
             self._incremental_classifier.begin(exploration_id)
-        if self._incremental_classifier is not None and state.phase == msg.ExplorationState.PHASE_ABORTED:
-            self._incremental_classifier.abort(exploration_id)
+        if state.phase in (state.PHASE_IDLE, state.PHASE_DONE, aborted):
+            self._incremental_classifier.end(exploration_id, aborted=state.phase == aborted)
 
     def _change(self, params: EstimatorParams) -> None:
         super()._change(params)
