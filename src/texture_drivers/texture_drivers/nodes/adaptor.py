@@ -63,7 +63,7 @@ class Adaptor(Node):
         self._received = self._lost = self._errors = 0
         self._fault = ''
         self._delivers = False
-        self._unmeasured = [name for name, adaptor in self._adaptors.items() if not adaptor.rate_hz]
+        self._rates_hz = {name: adaptor.rate_hz for name, adaptor in self._adaptors.items()}
         for adaptor in self._adaptors.values():
             wanted = adaptor.mapping
             self._listen(wanted.topic, wanted.type, adaptor.take)
@@ -86,8 +86,8 @@ class Adaptor(Node):
 
     def _publish(self) -> None:
         for name, adaptor in self._adaptors.items():
-            if adaptor.rate_hz and name in self._unmeasured:
-                self._unmeasured.remove(name)
+            if adaptor.rate_hz != self._rates_hz[name]:
+                self._rates_hz[name] = adaptor.rate_hz
                 self.get_logger().info(
                     f"the rate of '{name}' was measured: {adaptor.rate_hz:g} Hz; set rate_hz in the mapping to keep it"
                 )
@@ -116,6 +116,11 @@ class Adaptor(Node):
             ),
             (bool(rate_fault), 'ERROR', rate_fault),
             (new > 0, 'WARN', f'{new} samples lost since the last report'),
+            (
+                not all(adaptor.measured for adaptor in adaptors),
+                'WARN',
+                'measuring rates and times: 2 s without a silence of 0.5 s',
+            ),
             (not any(adaptor.samples for adaptor in adaptors), 'WARN', 'measuring rates and times'),
             (
                 missing > MOST_MISSING,
