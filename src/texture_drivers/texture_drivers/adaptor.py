@@ -4,11 +4,10 @@
 
 from __future__ import annotations
 
-import math
 import operator
 import re
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -44,7 +43,7 @@ class SignalMapping:
     gain: float = param(1.0, 'Factor by which the numbers are multiplied; it is signed.')
     rate_hz: float = param(
         0.0,
-        'Samples of a channel in a second, which are published once 2 s of messages agree with it; 0 measures it in 2 s '
+        'Samples of a channel in a second, published once 2 s of messages agree with it; 0 measures it in 2 s '
         'of even messages, to a whole hertz from 100 Hz on. Set it for training.',
         unit='Hz',
         low=0.0,
@@ -168,7 +167,6 @@ MOST_HZ = 10_000
 MOST_OFF = 0.25  # of a period: what is farther off a whole number of periods does not fit
 LEAST_FITTING = 0.75  # of the messages: of those that come in bursts or at random fewer fit
 LEAST_RECEIVED = 0.5  # of the periods: beyond, a period cannot be told from several
-SILENT_S = 0.5  # between messages: another driver may send now
 MOST_AHEAD_S = 0.25  # of samples beyond their time: a driver that was held up has sent what it held by then
 UNEVEN_TOLERANCE = 0.25  # of a rate that is no more than the mean over 2 s of uneven messages
 
@@ -186,13 +184,19 @@ class PeriodMeter:
         self._messages: list[tuple[int, int]] = []  # of this stretch: samples and time, ns
         self._after_first = 0  # samples of the stretch, without the first message
 
-    def add(self, samples: int, at_ns: int) -> tuple[float, bool] | None:
-        """Add a message; after a stretch return rate, Hz, and whether it is certain; 0 if the times do not advance."""
+    def add(self, samples: int, at_ns: int, known_hz: float = 0.0) -> tuple[float, bool] | None:
+        """Add a message; after a stretch return rate, Hz, and whether it is certain; 0 if the times do not advance.
+
+        A stretch ends early if its samples are far ahead of their time at a known rate.
+        """
         if self._messages and at_ns < self._messages[0][1]:  # the clock was set back
             self._messages = []
         self._after_first = self._after_first + samples if self._messages else 0
         self._messages.append((samples, at_ns))
         elapsed_ns = at_ns - self._messages[0][1]
+        if known_hz and self._after_first / known_hz - elapsed_ns / NANOSECONDS > MOST_AHEAD_S:
+            self._messages = []
+            return self._after_first * NANOSECONDS / (elapsed_ns or 1), True
         if len(self._messages) > MOST_AT_ONCE + MOST_HZ * elapsed_ns / NANOSECONDS:
             self._messages = []
             return 0.0, False
@@ -216,18 +220,13 @@ class PeriodMeter:
         self.missing = 1.0 - fitting / periods
         return counts[0] * periods * NANOSECONDS / (last_ns - times_ns[0]), True
 
-    def ahead_s(self, rate_hz: float) -> float:
-        """Return by how much the samples of this stretch exceed its time at a rate."""
-        elapsed_ns = self._messages[-1][1] - self._messages[0][1] if self._messages else 0
-        return self._after_first / rate_hz - elapsed_ns / NANOSECONDS if self._messages else 0.0
-
 
 # --------------------
 # One signal: its messages become numbered, timed batches.
 
 LATE_S = 0.015  # stamps jitter by some ms; what is later than that, and than half a message, has gaps before it
 MAX_WAITING = 50  # samples that wait for their number; more, and the number is taken as lost
-SILENCE_NS = NANOSECONDS  # after so long a number of 16 bits at 1 kHz may have wrapped unseen
+SILENCE_NS = NANOSECONDS // 2  # after it another driver may send, or a number of 16 bits have wrapped unseen
 SHORTEST_BLOCK_S = 0.007  # of samples without number and stamp: what is late by less than 10 ms is no loss
 MOST_NUMBERS = 100_000  # in a message; more is no tactile signal
 
@@ -326,15 +325,14 @@ class SignalAdaptor:
 
     def _measure(self, samples: int, at_ns: int) -> None:
         """Measure the rate, anew after a silence; what is measured later is compared with it."""
-        if abs(at_ns - self._came_ns) > SILENT_S * NANOSECONDS:
+        if abs(at_ns - self._came_ns) > SILENCE_NS:
             self._meter, self.measured, self.fault = PeriodMeter(), False, ''
             self._known = bool(self.mapping.rate_hz)
         self._came_ns = at_ns
-        measured = self._meter.add(samples, at_ns)
-        ahead = self.measured and self._meter.ahead_s(self.rate_hz) > MOST_AHEAD_S
-        if measured is None and not ahead:
+        measured = self._meter.add(samples, at_ns, self.rate_hz * self.measured)
+        if measured is None:
             return
-        rate_hz, certain = measured or (math.inf, True)
+        rate_hz, certain = measured
         tolerance = RATE_TOLERANCE if certain else UNEVEN_TOLERANCE
         if certain and not self._known:
             self._known = True
@@ -353,15 +351,12 @@ class SignalAdaptor:
                 'measured; set rate_hz in the mapping'
             )
         elif abs(rate_hz / self.rate_hz - 1) > tolerance:
-            brought = 'more' if ahead else f'{rate_hz:.4g}'
             fault = (
-                f"the messages on '{topic}' bring {brought} samples a second instead of {self.rate_hz:.4g}, and are "
-                'not published; correct rate_hz in the mapping, or start the node again to measure it'
+                f"the messages on '{topic}' bring {rate_hz:.4g} samples a second instead of {self.rate_hz:.4g}, and "
+                'are not published; correct rate_hz in the mapping, or start the node again to measure it'
             )
         elif not self.measured:
             self._interrupt()
-        if ahead:
-            self._meter = PeriodMeter()
         self.fault, self.measured = fault, not fault
 
     def _read(self, message: Any, sent_ns: int) -> Sample:
@@ -487,9 +482,3 @@ class SignalAdaptor:
             self._clock.time_ns(first), self._sensor, self._channels, units, self.rate_hz, first,
             rows.astype(np.float32), self._frame_id,
         )  # fmt: skip
-
-
-def losses(adaptors: Sequence[SignalAdaptor]) -> str:
-    """Return how exact the losses of some signals are."""
-    exact = all(adaptor.mapping.number for adaptor in adaptors)
-    return 'by number' if exact else 'estimated by time; shorter ones unknown'

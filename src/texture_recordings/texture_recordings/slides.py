@@ -272,8 +272,8 @@ def find_slides(
         )
     numbered = with_places(number_slides(labelled))
     if faulty := [slide for slide in numbered if slide.was_faulty]:
-        count = '1 aborted slide was' if len(faulty) == 1 else f'{len(faulty)} aborted slides were'
-        logging.getLogger(__name__).warning('%s left out: %s', count, ', '.join(slide.name for slide in faulty))
+        names = ', '.join(slide.name for slide in faulty)
+        logging.getLogger(__name__).warning('aborted slides that were left out, %d: %s', len(faulty), names)
         numbered = [slide for slide in numbered if not slide.was_faulty]
         if not numbered:
             raise InvalidData(f'all slides of {_named(paths)} were aborted; record again')
