@@ -65,8 +65,7 @@ class Child:
 
     def __init__(self, arguments: Sequence[str], environment: Mapping[str, str], log: Path) -> None:
         self.log = log
-        program = [sys.executable, '-m', 'texture_bringup.command']
-        self._command = ending_with_parent('INT', [*program, *arguments])
+        self._command = ending_with_parent('INT', [sys.executable, '-m', 'texture_bringup.command', *arguments])
         self._environment = environment
         self._process: subprocess.Popen[bytes] | None = None
 
@@ -202,8 +201,10 @@ class RunningNode(subprocess.Popen[str]):
         self.fault = ''  # the last line that it wrote, if that is a warning or an error
         self._say = say
         self._ended_s = math.inf
+        # Stop signals wait until a node of the suite handles them, see `texture_core.start`.
+        held = ['env', '--block-signal=INT,TERM'] if node.package.startswith('texture_') else []
         super().__init__(
-            ending_with_parent('TERM', command_line),
+            ending_with_parent('TERM', [*held, *command_line]),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -609,6 +610,9 @@ class _Reader:
                 met.append(typed(self.text(element, name), 'bool', where) is CONDITIONS[name])
             if all(met):
                 getattr(self, f'_read_{element.tag}')(element)
+            elif element.tag == 'include':
+                with contextlib.suppress(TextureError):
+                    self.declared |= set(_declared(_root(Path(self.text(element, 'file')))))
 
     def _read_arg(self, element: Element) -> None:
         name = self.text(element, 'name')
@@ -679,6 +683,8 @@ class _Reader:
             name, kind = self.text(element, 'name'), element.get('type', 'yaml')
             return {name: typed(self.text(element, 'value'), kind, f"the value of <param name='{name}'>")}
         path = Path(self.text(element, 'from'))
+        if path == Path():
+            raise InvalidLaunch(f'{element.get("from")} is empty; give the path of a parameter file, or leave it out')
         if 'name' in element.attrib:
             raise InvalidLaunch(f"<param from='{path}'> also has a name; the file holds the names")
         if not path.is_file():

@@ -220,16 +220,16 @@ def test_a_shipped_mapping_gives_the_vendors_numbers_at_their_rate_and_times(map
 
 def test_the_times_of_a_biotac_are_those_of_its_slots() -> None:
     signals = load_mapping('biotac_sensors', 2).signals
-    pac, slow = (fed(SignalAdaptor(name, signals[name]), biotac_hand, range(50), 10 * MS)[-1] for name in signals)
-    frame_ns = START_NS + 48 * 10 * MS  # the stamp of the last message is the end of this frame
+    pac, slow = (fed(SignalAdaptor(name, signals[name]), biotac_hand, range(300), 10 * MS)[-1] for name in signals)
+    frame_ns = START_NS + 298 * 10 * MS  # the stamp of the last message is the end of this frame
     assert abs(slow.stamp_ns - frame_ns) < 1000
     assert abs(pac.stamp_ns - frame_ns - 227_273) < 1000
 
 
 def test_jitter_of_stamps_makes_no_losses_and_hardly_moves_the_times() -> None:
-    late_ns = np.random.default_rng(0).integers(0, 4 * MS, 300)
+    late_ns = np.random.default_rng(0).integers(0, 4 * MS, 500)
     adaptor = SignalAdaptor('signal', load_mapping('biotac_sensors').signals['signal'])
-    batches = fed(adaptor, lambda n, ns: biotac_hand(n, ns + int(late_ns[n])), range(300), 10 * MS)
+    batches = fed(adaptor, lambda n, ns: biotac_hand(n, ns + int(late_ns[n])), range(500), 10 * MS)
     assert jumps(batches) == adaptor.lost == 0
     stamps = np.array([batch.stamp_ns for batch in batches][100:])
     assert np.ptp(stamps - 10 * MS * np.arange(len(stamps))) < MS
@@ -323,6 +323,65 @@ def test_samples_at_a_wrong_rate_are_withheld_and_later_ones_have_the_right_time
     assert ends_ns == pytest.approx(period_ns * np.arange(1 - len(batches), 1), abs=1.1 * period_ns)
 
 
+class Wrenches:
+    """A driver of wrenches, stopped and started again at another rate."""
+
+    def __init__(self, rate_hz: float = 0.0) -> None:
+        self.adaptor, self.now_s, self.random = wrenches(rate_hz), 0.0, np.random.default_rng(0)
+
+    def run(self, rate_hz: float, seconds: float, jitter: float = 0.0) -> int:
+        """Send for a while, each message late by up to `jitter` periods; return how many samples were published."""
+        times_s = self.now_s + (np.arange(round(seconds * rate_hz)) + 1) / rate_hz
+        late_s = jitter * self.random.random(len(times_s)) / rate_hz
+        self.now_s = times_s[-1]
+        before = self.adaptor.samples
+        for at_s in np.sort(times_s + late_s):
+            fed(self.adaptor, CASES['wrench', 'signal'][0], [1], at_s * NANOSECONDS)
+        return self.adaptor.samples - before
+
+
+@pytest.mark.parametrize('jitter', [0.0, 3.0])
+def test_after_a_silence_nothing_is_published_until_the_rate_is_measured_again(jitter: float) -> None:
+    driver = Wrenches()
+    assert driver.run(100, 5) > 250
+    driver.now_s += 0.6
+    assert driver.run(500, 1.9, jitter) == 0
+    late = driver.run(500, 10, jitter)
+    if jitter:  # too uneven to be measured
+        assert (late, driver.adaptor.measured) == (0, False)
+        assert 'come unevenly, about' in driver.adaptor.fault
+        driver.now_s += 0.6
+        late = driver.run(500, 10)
+    assert late > 7 * 500
+    assert (driver.adaptor.rate_hz, driver.adaptor.fault) == (500.0, '')
+
+
+@pytest.mark.parametrize('jitter', [0.0, 3.0])
+def test_a_rate_that_rises_ends_publication_within_70_ms_of_samples(jitter: float) -> None:
+    driver = Wrenches()
+    driver.run(100, 5)
+    assert driver.run(500, 5, jitter) <= 0.07 * 500 + 1
+    assert 'bring' in driver.adaptor.fault
+    assert 'samples a second instead of 100, and are not published' in driver.adaptor.fault
+
+
+def test_a_rate_of_the_mapping_is_published_only_once_messages_agree_with_it() -> None:
+    assert Wrenches(100.0).run(500, 20) == 0
+    assert Wrenches(100.0).run(500, 20, jitter=3.0) == 0
+    assert Wrenches(100.0).run(100, 1.9) == 0
+    assert Wrenches(100.0).run(100, 5) > 250
+    assert Wrenches(100.0).run(100, 5, jitter=3.0) > 250
+
+
+def test_a_driver_that_was_held_up_for_less_than_half_a_second_is_still_published() -> None:
+    driver = Wrenches()
+    driver.run(100, 5)
+    held = driver.now_s + 0.2
+    fed(driver.adaptor, CASES['wrench', 'signal'][0], [1] * 20, held * NANOSECONDS)
+    driver.now_s = held
+    assert driver.run(100, 4) > 390
+
+
 def test_times_that_stand_still_are_a_fault_and_those_of_a_clock_that_was_set_back_begin_anew() -> None:
     adaptor, make = wrenches(), CASES['wrench', 'signal'][0]
     for _ in range(2000):
@@ -347,7 +406,7 @@ def test_a_rate_that_is_set_and_wrong_is_a_fault_and_one_that_cannot_be_measured
 
 def test_a_gap_in_the_stamps_is_a_loss() -> None:
     adaptor = SignalAdaptor('signal', load_mapping('biotac_sensors').signals['signal'])
-    batches = fed(adaptor, biotac_hand, [n for n in range(60) if not 30 <= n < 34], 10 * MS)
+    batches = fed(adaptor, biotac_hand, [n for n in range(300) if not 230 <= n < 234], 10 * MS)
     assert jumps(batches) == adaptor.lost == 4 * 22
 
 
@@ -364,15 +423,18 @@ class Driver:
         self.ticks = ticks
         self.adaptor = SignalAdaptor('signal', load_mapping('robotiq_tsf', 1).signals['signal'])
         self.batches: list[TactileSignal] = []
-        self.stamp, self.now_ns = 65_400, START_NS
+        self.stamp, self.now_ns, self.sent = 63_300, START_NS, 0
+        self.run(2100)  # its rate is measured
+        self.batches.clear()
 
     def run(self, packets: int, **faults: Any) -> None:
         for value in range(packets):
             lose, step = faults.get(f'at_{value}', ((), 1))
             self.stamp += step
             self.now_ns += step * MS or 50_000
+            self.sent += 1
             if 'sample' not in lose:
-                self.adaptor.take(Message(data=[Message(value=0), Message(value=value)]), self.now_ns)
+                self.adaptor.take(Message(data=[Message(value=0), Message(value=self.sent)]), self.now_ns)
             if 'stamp' not in lose:
                 stamp = self.stamp % 2**16 if self.ticks == 1 else self.stamp * self.ticks
                 self.adaptor.take_number(Message(values=[0, stamp]), self.now_ns + 5000)
@@ -415,7 +477,7 @@ def test_after_a_long_silence_the_gap_is_that_of_the_clock() -> None:
     before = driver.batches[-1]
     driver.now_ns += 70_000 * MS  # the number of 16 bits has wrapped
     driver.stamp += 70_000
-    driver.run(500)
+    driver.run(2600)  # the rate is measured again
     after = next(batch for batch in driver.batches if batch.first_sample > before.next_sample)
     gap_s = (after.stamp_ns - before.end_ns) / 1e9
     assert gap_s > 70

@@ -34,8 +34,8 @@ def test_messages_become_signals_and_silence_and_malformed_values_are_reported(
 ) -> None:
     mapping = tmp_path / 'mine.yaml'
     mapping.write_text(
-        'signals: {signal: {topic: tactile, type: std_msgs/msg/Float32MultiArray, values: [data], channels: [a, b], '
-        'units: [N], rate_hz: 1000, sensor: mine}}'
+        'signals: {signal: {topic: tactile, type: std_msgs/msg/Float32MultiArray, values: [data], '
+        "channels: [a, b, at_s], stamp: 'data[2]', units: [N], rate_hz: 1000, sensor: mine}}"
     )
     graph.add(Adaptor, mapping=str(mapping), frame_id='tip')
     signals = graph.listen(msg.TactileSignal, 'signal', SENSOR_QOS)
@@ -48,16 +48,17 @@ def test_messages_become_signals_and_silence_and_malformed_values_are_reported(
     numbers = itertools.count()
 
     def heard() -> bool:
-        sender.publish(Float32MultiArray(data=[float(next(numbers)), 0.5]))
+        number = next(numbers)
+        sender.publish(Float32MultiArray(data=[float(number), 0.5, 1.0 + number / 1000]))
         return bool(signals)
 
     graph.until(heard)
-    assert (signals[0].sensor, signals[0].header.frame_id, list(signals[0].units)) == ('mine', 'tip', ['N', 'N'])
+    assert (signals[0].sensor, signals[0].header.frame_id, list(signals[0].units)) == ('mine', 'tip', ['N'] * 3)
     assert np.array(signals[0].samples)[1] == 0.5
     assert capfd.readouterr().err.count('the sensor delivers samples') == 1
     reports.clear()
     sender.publish(Float32MultiArray(data=[1.0]))
-    graph.until(lambda: any('1 numbers; 2 are needed' in report.status[0].message for report in reports))
+    graph.until(lambda: any('1 numbers; 3 are needed' in report.status[0].message for report in reports))
     values = {value.key: value.value for value in reports[-1].status[0].values}
     assert values['refused messages'] == '1'
     assert 'unknown' in values['losses']

@@ -7,7 +7,7 @@ from __future__ import annotations
 import operator
 import re
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -43,8 +43,8 @@ class SignalMapping:
     gain: float = param(1.0, 'Factor by which the numbers are multiplied; it is signed.')
     rate_hz: float = param(
         0.0,
-        'Samples of a channel in a second; 0 measures it in 2 s of even messages, to a whole hertz from 100 Hz on. Set '
-        'it for training.',
+        'Samples of a channel in a second, published once 2 s of messages agree with it; 0 measures it in 2 s '
+        'of even messages, to a whole hertz from 100 Hz on. Set it for training.',
         unit='Hz',
         low=0.0,
         high=1e6,
@@ -167,6 +167,8 @@ MOST_HZ = 10_000
 MOST_OFF = 0.25  # of a period: what is farther off a whole number of periods does not fit
 LEAST_FITTING = 0.75  # of the messages: of those that come in bursts or at random fewer fit
 LEAST_RECEIVED = 0.5  # of the periods: beyond, a period cannot be told from several
+MOST_AHEAD_S = 0.25  # of samples beyond their time: a driver that was held up has sent what it held by then
+UNEVEN_TOLERANCE = 0.25  # of a rate that is no more than the mean over 2 s of uneven messages
 
 
 class PeriodMeter:
@@ -180,13 +182,21 @@ class PeriodMeter:
     def __init__(self) -> None:
         self.missing = 0.0  # fraction of the messages of the last certain stretch that did not come
         self._messages: list[tuple[int, int]] = []  # of this stretch: samples and time, ns
+        self._after_first = 0  # samples of the stretch, without the first message
 
-    def add(self, samples: int, at_ns: int) -> tuple[float, bool] | None:
-        """Add a message; after a stretch return rate, Hz, and whether it is certain; 0 if the times do not advance."""
+    def add(self, samples: int, at_ns: int, known_hz: float = 0.0) -> tuple[float, bool] | None:
+        """Add a message; after a stretch return rate, Hz, and whether it is certain; 0 if the times do not advance.
+
+        A stretch ends early if its samples are far ahead of their time at a known rate.
+        """
         if self._messages and at_ns < self._messages[0][1]:  # the clock was set back
             self._messages = []
+        self._after_first = self._after_first + samples if self._messages else 0
         self._messages.append((samples, at_ns))
         elapsed_ns = at_ns - self._messages[0][1]
+        if known_hz and self._after_first / known_hz - elapsed_ns / NANOSECONDS > MOST_AHEAD_S:
+            self._messages = []
+            return self._after_first * NANOSECONDS / (elapsed_ns or 1), True
         if len(self._messages) > MOST_AT_ONCE + MOST_HZ * elapsed_ns / NANOSECONDS:
             self._messages = []
             return 0.0, False
@@ -216,7 +226,7 @@ class PeriodMeter:
 
 LATE_S = 0.015  # stamps jitter by some ms; what is later than that, and than half a message, has gaps before it
 MAX_WAITING = 50  # samples that wait for their number; more, and the number is taken as lost
-SILENCE_NS = NANOSECONDS  # after so long a number of 16 bits at 1 kHz may have wrapped unseen
+SILENCE_NS = NANOSECONDS // 2  # after it another driver may send, or a number of 16 bits have wrapped unseen
 SHORTEST_BLOCK_S = 0.007  # of samples without number and stamp: what is late by less than 10 ms is no loss
 MOST_NUMBERS = 100_000  # in a message; more is no tactile signal
 
@@ -237,7 +247,8 @@ class SignalAdaptor:
         self.mapping = mapping
         self.samples = self.lost = self.refused = self.invalid = self.unnumbered = self.unpaired = 0
         self.rate_hz = mapping.rate_hz  # 0 until it has been measured
-        self.fault = ''  # what is wrong with the rate; while it holds no sample is published
+        self.measured = False  # whether the messages agree with the rate; until then no sample is published
+        self.fault = ''  # what is wrong with the rate
         self._sensor, self._frame_id = mapping.sensor or name, frame_id
         self._channels = tuple(mapping.channels)
         self._values = [compile_path(path) for path in mapping.values]
@@ -249,6 +260,8 @@ class SignalAdaptor:
         self._ready: list[Sample] = []
         self._placed: list[tuple[int, Array]] = []
         self._last_number: int | None = None
+        self._came_ns = 0  # time of the newest message
+        self._known = bool(mapping.rate_hz)  # whether there is a rate with which messages are compared
         self._start()
 
     def take(self, message: Any, sent_ns: int) -> None:
@@ -259,7 +272,7 @@ class SignalAdaptor:
             self.refused += 1
             raise
         self._measure(len(sample.rows), sample.end_ns)
-        if self.fault or not self.rate_hz:
+        if not self.measured:
             return
         if self.mapping.number_topic:
             self._samples.append(sample)
@@ -271,10 +284,13 @@ class SignalAdaptor:
     def take_number(self, message: Any, sent_ns: int) -> None:
         """Take a message with the number of a sample; InvalidData, and counted, if it does not fit."""
         try:
-            self._numbers.append((self._read_number(message), sent_ns))
+            number = self._read_number(message)
         except InvalidData:
             self.refused += 1
             raise
+        if not self.measured:
+            return
+        self._numbers.append((number, sent_ns))
         if len(self._numbers) > MAX_WAITING + len(self._samples):
             self._numbers.pop()
             self.unpaired += 1
@@ -308,33 +324,40 @@ class SignalAdaptor:
         return 0.0 if self.mapping.number or self.mapping.number_topic else self._meter.missing
 
     def _measure(self, samples: int, at_ns: int) -> None:
-        """Measure the rate until it is known, then compare what is measured with it."""
-        measured = self._meter.add(samples, at_ns)
+        """Measure the rate, anew after a silence; what is measured later is compared with it."""
+        if abs(at_ns - self._came_ns) > SILENCE_NS:
+            self._meter, self.measured, self.fault = PeriodMeter(), False, ''
+            self._known = bool(self.mapping.rate_hz)
+        self._came_ns = at_ns
+        measured = self._meter.add(samples, at_ns, self.rate_hz * self.measured)
         if measured is None:
             return
         rate_hz, certain = measured
-        if certain and not self.rate_hz:
-            self.rate_hz = rounded_rate(rate_hz)
-            self._start()
+        tolerance = RATE_TOLERANCE if certain else UNEVEN_TOLERANCE
+        if certain and not self._known:
+            self._known = True
+            if not self.rate_hz or abs(rate_hz / self.rate_hz - 1) > tolerance:
+                self.rate_hz = rounded_rate(rate_hz)
+                self._start()
+        topic, fault = self.mapping.topic, ''
         if not rate_hz:
-            self.fault = (
-                f"the times of the messages on '{self.mapping.topic}' do not advance; check the clock of the driver, "
-                'or leave `stamp` out of the mapping, and start the node again'
+            fault = (
+                f"the times of the messages on '{topic}' do not advance; check the clock of the driver, or leave "
+                '`stamp` out of the mapping, and start the node again'
             )
-        elif not self.rate_hz:
-            self.fault = (
-                f"the messages on '{self.mapping.topic}' come unevenly, about {rate_hz:.4g} samples a second: their "
-                'rate cannot be measured; set rate_hz in the mapping'
+        elif not self._known:
+            fault = (
+                f"the messages on '{topic}' come unevenly, about {rate_hz:.4g} samples a second: their rate cannot be "
+                'measured; set rate_hz in the mapping'
             )
-        elif certain and abs(rate_hz / self.rate_hz - 1) > RATE_TOLERANCE:
-            self.fault = (
-                f"the messages on '{self.mapping.topic}' bring {rate_hz:.4g} samples a second instead of "
-                f'{self.rate_hz:.4g}, and are not published; correct rate_hz in the mapping, or start the node again '
-                'to measure it'
+        elif abs(rate_hz / self.rate_hz - 1) > tolerance:
+            fault = (
+                f"the messages on '{topic}' bring {rate_hz:.4g} samples a second instead of {self.rate_hz:.4g}, and "
+                'are not published; correct rate_hz in the mapping, or start the node again to measure it'
             )
-        elif certain and self.fault:
-            self.fault = ''
+        elif not self.measured:
             self._interrupt()
+        self.fault, self.measured = fault, not fault
 
     def _read(self, message: Any, sent_ns: int) -> Sample:
         rows = self._rows(message)
@@ -459,9 +482,3 @@ class SignalAdaptor:
             self._clock.time_ns(first), self._sensor, self._channels, units, self.rate_hz, first,
             rows.astype(np.float32), self._frame_id,
         )  # fmt: skip
-
-
-def losses(adaptors: Sequence[SignalAdaptor]) -> str:
-    """Return how exact the losses of some signals are."""
-    exact = all(adaptor.mapping.number for adaptor in adaptors)
-    return 'by number' if exact else 'estimated by time; shorter ones unknown'

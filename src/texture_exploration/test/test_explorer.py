@@ -213,6 +213,23 @@ PATCH = SurfacePatch(-0.03, 0.05, -0.02, 0.02)
 THERE = replace(QUICK, use_start=True, start_x_m=0.0, start_y_m=-0.02)
 
 
+@pytest.mark.parametrize(
+    ('patch', 'edges'),
+    [
+        (SurfacePatch(-0.03, 0.05, -0.02, 0.04), (-0.03, 0.05, -0.02, 0.04)),
+        (SurfacePatch(-0.3, 0.05, -0.02, 0.04), (-0.1, 0.05, -0.02, 0.04)),
+        (SurfacePatch(-0.03, 0.5, -0.02, 0.04), (-0.03, 0.11, -0.02, 0.04)),
+        (SurfacePatch(-0.03, 0.05, -0.2, 0.04), (-0.03, 0.05, -0.12, 0.04)),
+        (SurfacePatch(-0.03, 0.05, -0.02, 0.4), (-0.03, 0.05, -0.02, 0.13)),
+    ],
+)
+def test_on_a_patch_the_workspace_along_the_surface_is_what_both_allow(patch, edges):
+    limits = SafetyLimits(x_low_m=-0.1, x_high_m=0.11, y_low_m=-0.12, y_high_m=0.13)
+    within = patch.within(limits)
+    assert (within.x_low_m, within.x_high_m, within.y_low_m, within.y_high_m) == edges
+    assert (within.z_low_m, within.z_high_m) == (limits.z_low_m, limits.z_high_m)
+
+
 def test_an_exploration_begins_at_its_start_on_the_patch_and_lifts_there(explorer):
     explorer.patch = PATCH
     exploration = explorer.begin('one', THERE)

@@ -137,3 +137,17 @@ def test_only_what_was_measured_above_the_surface_counts_as_free_air(lift, drift
     for height_m, force_n in lift:
         watch.note(Phase.LIFT, ArmState(10**9, (0.0, 0.0, height_m), (0.0, 0.0, 0.0), force_n), ArmCommand())
     assert bool(watch.drifted()) is drifted
+
+
+@pytest.mark.parametrize('moves_at_s', [0.0, 0.3])
+def test_what_was_measured_while_the_sensor_may_be_zeroed_is_no_free_air(moves_at_s):
+    """An arm zeroes for 0.1 s from its first state, or from its last one at rest: here -3 N become 0 N."""
+    watch = ForceWatch(SafetyLimits(), True, wanted_n=1.0)
+    zeroed_s = moves_at_s + 0.08
+    for step in range(round(100 * zeroed_s) + 6):
+        at_s = 0.01 * step
+        free = ArmState(step * 10_000_000, (0.0, 0.0, 0.01), (0.0, 0.0, 0.0), -3.0 if at_s < zeroed_s else 0.0)
+        watch.note(Phase.APPROACH, free, ArmCommand() if at_s < moves_at_s else ArmCommand(normal_m_s=-0.01))
+    for height_m in (0.0, 0.004, 0.008):
+        watch.note(Phase.LIFT, ArmState(10**9, (0.0, 0.0, height_m), (0.0, 0.0, 0.0), 3.0), ArmCommand())
+    assert 'was 0.00 N before the slide and 3.00 N after it' in watch.drifted()

@@ -63,15 +63,20 @@ def test_slides_are_counted_for_each_surface_in_the_order_recorded_over_all_bags
     assert {slide.exploration_id for slide in find_slides([late, early], '2')} == {'early/2', 'late/0'}
 
 
-def test_a_slide_whose_force_was_wrong_is_left_out_and_named(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_an_aborted_slide_is_left_out_and_named_but_not_one_that_the_user_ended(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     aborted = (Phase.SLIDE, Phase.LIFT, Phase.ABORTED)
     stopped = write(tmp_path / 'stopped', ['cork'], 0, aborted, ExplorationError.STOPPED)
     drifted = write(tmp_path / 'drifted', ['cork'], 100, aborted, ExplorationError.FORCE_SENSOR)
     good = write(tmp_path / 'good', ['cork'], 200)
+    slow = write(tmp_path / 'slow', ['felt'], 300, aborted, ExplorationError.MOTION_FAILED)
     assert [slide.name for slide in find_slides([stopped, drifted, good])] == ['cork/1', 'cork/3']
-    assert 'left out, as the force sensor was wrong in their explorations: cork/2' in caplog.text
-    with pytest.raises(InvalidData, match='the force sensor was wrong in all slides'):
-        find_slides([drifted])
+    assert 'aborted slides that were left out, 1: cork/2' in caplog.text
+    assert [slide.name for slide in find_slides([drifted, good, slow])] == ['cork/2']
+    assert 'aborted slides that were left out, 2: cork/1, felt/1' in caplog.text
+    with pytest.raises(InvalidData, match=r"all slides of '.*slow' were aborted; record again"):
+        find_slides([slow])
 
 
 def test_a_slide_yields_its_messages_only(tmp_path: Path) -> None:

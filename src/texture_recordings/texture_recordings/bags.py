@@ -657,6 +657,12 @@ COMMON: Mapping[str, Quality] = {
 }
 
 
+def refuse_existing(path: str | Path) -> None:
+    """Refuse a path for a new bag where something exists."""
+    if Path(path).exists():
+        raise InvalidData(f"'{path}' exists already; a bag is never overwritten, name another or remove it")
+
+
 class BagWriter:
     """Write a new bag; use it in a `with` block, at the end of which the bag is complete."""
 
@@ -664,8 +670,7 @@ class BagWriter:
         self.path = Path(path)
         self._connections: dict[tuple[str, str], Connection] = {}
         self.qualities: dict[str, Quality] = {}  # of topics that are none of the suite, as they were offered
-        if self.path.exists():
-            raise InvalidData(f"'{path}' exists already; a bag is never overwritten, name another or remove it")
+        refuse_existing(self.path)
         self._writer = Writer(self.path, version=8, storage_plugin=StoragePlugin.MCAP)
         self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
         try:

@@ -37,6 +37,7 @@ from texture_recordings.bags import EXPLORATION, find_bags, read_bag
 # --------------------
 # One labelled slide in a bag.
 
+BY_USER = (ExplorationError.STOPPED, ExplorationError.CANCELLED, ExplorationError.TIMEOUT)
 TOUCH_NS = 200_000_000  # the skin feels a touch before the arm does; of a shorter approach, half
 
 
@@ -77,9 +78,9 @@ class LabelledSlide:
         return self.bag.name.removesuffix('.mcap')
 
     @property
-    def force_was_wrong(self) -> bool:
-        """Whether its exploration ended with a fault of the force sensor, such as drift found after the slide."""
-        return any(state.error_code == ExplorationError.FORCE_SENSOR for state in self.states)
+    def was_faulty(self) -> bool:
+        """Whether its exploration was aborted, also by a fault found after the slide; not if the user has ended it."""
+        return any(state.phase is Phase.ABORTED and state.error_code not in BY_USER for state in self.states)
 
     @property
     def sliding(self) -> Sequence[ExplorationState]:
@@ -270,12 +271,12 @@ def find_slides(
             f"no slide in {_named(paths)} is labelled; give the surface's name with each exploration you record"
         )
     numbered = with_places(number_slides(labelled))
-    if doubtful := [slide for slide in numbered if slide.force_was_wrong]:
-        names = ', '.join(slide.name for slide in doubtful)
-        logging.getLogger(__name__).warning('left out, as the force sensor was wrong in their explorations: %s', names)
-        numbered = [slide for slide in numbered if not slide.force_was_wrong]
+    if faulty := [slide for slide in numbered if slide.was_faulty]:
+        names = ', '.join(slide.name for slide in faulty)
+        logging.getLogger(__name__).warning('aborted slides that were left out, %d: %s', len(faulty), names)
+        numbered = [slide for slide in numbered if not slide.was_faulty]
         if not numbered:
-            raise InvalidData(f'the force sensor was wrong in all slides of {_named(paths)}; record again')
+            raise InvalidData(f'all slides of {_named(paths)} were aborted; record again')
     found = [slide for slide in numbered if wanted is None or slide.number in wanted]
     if not found:
         most = max(slide.number for slide in numbered)

@@ -56,8 +56,7 @@ def _configure_launch(parser: argparse.ArgumentParser) -> None:
 
 def _launch(options: argparse.Namespace) -> int:
     """Run the nodes until they end or Ctrl-C; return 2 if a needed one was started wrongly, 1 if one died, else 0."""
-    given = given_arguments(options.arguments)
-    nodes = read(find_launch_file(options.file), given, os.environ)
+    nodes = read(find_launch_file(options.file), given_arguments(options.arguments), os.environ)
     refuse_wrong(nodes)
     for line in raised_limits(nodes):
         _say(f'[launch] warning: {line}')
@@ -77,7 +76,8 @@ LOADED: Mapping[str, Callable[[Any], Any]] = {
         given.model and _call('texture_estimation.roughness:load_roughness_model', given.model)
     ),
     'feature_extractor': lambda given: _call('texture_features.feature_set:FeatureSet.load', given.recipe),
-    'adaptor': lambda given: _call('texture_drivers.adaptor:load_mapping', given.mapping, given.finger),
+    'adaptor': lambda given: _call('texture_drivers.nodes.adaptor:load_messages', given.mapping, given.finger),
+    'record': lambda given: given.out and _call('texture_recordings.bags:refuse_existing', given.out),
     'replay': lambda given: (
         given.bag
         and (
@@ -96,17 +96,13 @@ def refuse_wrong(nodes: Sequence[NodeDescription]) -> None:
 
     In a separate process: a launcher that stays needs none of their libraries.
     """
-    with ProcessPoolExecutor(1, get_context('fork')) as pool:
+    # A pool ends only if nothing interrupts the process within it.
+    held = signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM)
+    with ProcessPoolExecutor(1, get_context('fork'), signal.pthread_sigmask, held) as pool:
         checked = pool.submit(_check, nodes)
         with task('checking what the launch was given'):  # behind the fork, which copies no thread
             pipes = checked.result()
     for pipe in pipes:
-        if pipes.count(pipe) > 1:
-            raise InvalidLaunch(
-                f"{pipes.count(pipe)} emulators of this launch have the pipe '{pipe}'; give each included launch file "
-                'another argument `namespace`, after which the folder of its devices is named: push_ros_namespace '
-                'alone does not name it'
-            )
         claim(Path(pipe).expanduser())
 
 
@@ -121,13 +117,12 @@ def _check(nodes: Sequence[NodeDescription]) -> list[str]:
             loaded.setdefault(node.executable, {})[node.namespace, features] = LOADED[node.executable](given)
     for place, extracted in loaded.get('feature_extractor', {}).items():
         for program in ('classifier', 'roughness_estimator'):
-            if model := loaded.get(program, {}).get(place):
-                misfit = _call('texture_features.feature_set:recipe_misfit', extracted, model.feature_set)
-                if misfit:
-                    raise InvalidLaunch(
-                        f"the recipe does not fit model '{model.name}': {misfit}; leave recipe:= out, and it is that "
-                        'of the model'
-                    )
+            model = loaded.get(program, {}).get(place)
+            if model and (misfit := _call('texture_features.feature_set:recipe_misfit', extracted, model.feature_set)):
+                raise InvalidLaunch(
+                    f"the recipe does not fit model '{model.name}': {misfit}; leave recipe:= out, and it is that "
+                    'of the model'
+                )
     emulators = [node for node, _ in settings if node.executable == 'emulator']
     pipes = [str(part['finger_pipe']) for node in emulators for _, _, part in _sections(node) if 'finger_pipe' in part]
     for pipe in pipes:  # one uses it; else a recorder has made its bag
@@ -156,9 +151,8 @@ def _classes(node: NodeDescription, arm: str = '') -> list[type]:
     own = [one for one in module.values() if isinstance(one, type) and is_dataclass(one)]
     arms = module.get('ARMS', {})
     chosen = [find(arms, arm, 'arm')] if arms and arm else arms.values()
-    return [one for one in own if any('description' in item.metadata for item in fields(one))] + [
-        one.Params for one in chosen
-    ]
+    own = [one for one in own if any('description' in item.metadata for item in fields(one))]
+    return [*own, *(one.Params for one in chosen)]
 
 
 def _names(node: NodeDescription) -> set[str]:
@@ -169,7 +163,7 @@ def _settings(node: NodeDescription, nodes: Sequence[NodeDescription]) -> Simple
     """Return all parameters of a node, each checked where it was given; TextureError for one that no node has."""
     given = list(_sections(node))
     arm = {name: value for _, _, values in given for name, value in values.items()}.get('arm', 'simulated')
-    classes, names = _classes(node, str(arm)), _names(node)
+    classes = _classes(node, str(arm))
     items = {item.name: item for one in classes for item in parameters_of(one)}
     values: dict[str, Any] = {}
     for path, section, part in given:
@@ -180,7 +174,7 @@ def _settings(node: NodeDescription, nodes: Sequence[NodeDescription]) -> Simple
                     values[name] = items[name].check(_number(items[name].type, value))
                 except InvalidParameter as error:
                     raise InvalidParameter(f"{where}, node '{node.label}': {error}") from error
-            elif name not in names and not name.startswith('qos_overrides.'):
+            elif not name.startswith('qos_overrides.'):
                 readers = [one for one in nodes if path in one.parameters and reaches(section, one.full_name)] or [node]
                 if all(_known(one) and name not in _names(one) for one in readers):
                     near = get_close_matches(name, set().union(*map(_names, readers)), n=1)
@@ -229,14 +223,14 @@ def raised_limits(nodes: Sequence[NodeDescription]) -> Iterator[str]:
 
 
 def claim(pipe: Path) -> None:
-    """Hold the pipe of an emulator until this process ends: the sensor of a second launch would read its devices."""
+    """Hold the pipe of an emulator until this process ends: the sensor of a second one would read its devices."""
     pipe.parent.mkdir(parents=True, exist_ok=True)
     try:
         fcntl.flock(os.open(f'{pipe}.lock', os.O_RDWR | os.O_CREAT, 0o600), fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:
         raise LaunchFailed(
-            f"another launch has the emulator at '{pipe}'; end it, or give this one another argument `namespace`: "
-            'push_ros_namespace alone does not name the folder of its devices'
+            f"another emulator, of this launch or another one, has the pipe '{pipe}'; end that launch, or give each of "
+            'them another argument `namespace`: push_ros_namespace alone does not name the folder of its devices'
         ) from error
 
 

@@ -16,7 +16,7 @@ from texture_msgs import msg
 from texture_core.config import param
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.ros import SENSOR_QOS, DiagnosticReport, Diagnostics, declare, frame_name, run, to_msg
-from texture_drivers.adaptor import SignalAdaptor, load_mapping, losses
+from texture_drivers.adaptor import AdaptorMapping, SignalAdaptor, load_mapping
 from texture_drivers.health import BEFORE_THE_START
 from texture_drivers.sensor import BatchParams
 
@@ -36,6 +36,13 @@ def import_message(message_type: str) -> Any:
         ) from error
 
 
+def load_messages(mapping: str, finger: int) -> tuple[AdaptorMapping, dict[str, Any]]:
+    """Return a mapping, and the classes of its messages by their types."""
+    loaded = load_mapping(mapping, finger)
+    kinds = [kind for one in loaded.signals.values() for kind in (one.type, one.number_type) if kind]
+    return loaded, {kind: import_message(kind) for kind in kinds}
+
+
 @dataclass(frozen=True)
 class AdaptorParams(BatchParams):
     """Parameters that select which messages are converted."""
@@ -52,7 +59,7 @@ class Adaptor(Node):
         super().__init__('adaptor', **kwargs)
         params = declare(self, AdaptorParams)
         frame_id = frame_name(self.get_namespace(), params.frame_id)
-        mapping = load_mapping(params.mapping, params.finger)
+        mapping, self._messages = load_messages(params.mapping, params.finger)
         self._adaptors = {
             name: SignalAdaptor(f'{params.mapping}/{name}', signal, frame_id)
             for name, signal in mapping.signals.items()
@@ -63,7 +70,7 @@ class Adaptor(Node):
         self._received = self._lost = self._errors = 0
         self._fault = ''
         self._delivers = False
-        self._unmeasured = [name for name, adaptor in self._adaptors.items() if not adaptor.rate_hz]
+        self._rates_hz = {name: adaptor.rate_hz for name, adaptor in self._adaptors.items()}
         for adaptor in self._adaptors.values():
             wanted = adaptor.mapping
             self._listen(wanted.topic, wanted.type, adaptor.take)
@@ -82,12 +89,12 @@ class Adaptor(Node):
             except InvalidData as error:
                 self._fault = str(error)
 
-        self.create_subscription(import_message(message_type), topic, on_message, SENSOR_QOS)
+        self.create_subscription(self._messages[message_type], topic, on_message, SENSOR_QOS)
 
     def _publish(self) -> None:
         for name, adaptor in self._adaptors.items():
-            if adaptor.rate_hz and name in self._unmeasured:
-                self._unmeasured.remove(name)
+            if adaptor.rate_hz != self._rates_hz[name]:
+                self._rates_hz[name] = adaptor.rate_hz
                 self.get_logger().info(
                     f"the rate of '{name}' was measured: {adaptor.rate_hz:g} Hz; set rate_hz in the mapping to keep it"
                 )
@@ -102,6 +109,7 @@ class Adaptor(Node):
         received, fault = self._received, self._fault
         rate_fault = next((adaptor.fault for adaptor in adaptors if adaptor.fault), '')
         self._received, self._fault = 0, ''
+        exact = all(adaptor.mapping.number for adaptor in adaptors)
         missing = max(adaptor.missing for adaptor in adaptors)
         lost = sum(adaptor.lost for adaptor in adaptors)
         new, self._lost = lost - self._lost, lost
@@ -116,7 +124,7 @@ class Adaptor(Node):
             ),
             (bool(rate_fault), 'ERROR', rate_fault),
             (new > 0, 'WARN', f'{new} samples lost since the last report'),
-            (not any(adaptor.samples for adaptor in adaptors), 'WARN', 'measuring rates and times'),
+            (not all(one.measured for one in adaptors), 'WARN', 'measuring rates and times, in 2 s without a silence'),
             (
                 missing > MOST_MISSING,
                 'WARN',
@@ -133,7 +141,7 @@ class Adaptor(Node):
         values = {
             'samples': sum(adaptor.samples for adaptor in adaptors),
             'lost': lost,
-            'losses': losses(adaptors),
+            'losses': 'by number' if exact else 'estimated by time; shorter ones unknown',
             **BEFORE_THE_START,
             'refused messages': sum(adaptor.refused for adaptor in adaptors),
             'values that are no number': sum(adaptor.invalid for adaptor in adaptors),
