@@ -171,7 +171,7 @@ def test_the_sentences_of_the_pages_hold_the_limits_of_the_code():
             f'under {100 * touching.stall_speed_fraction:g} % of the path',
             f'mean force off by {100 * mean:g} % (UR5e presets ',
             f'), speed by {100 * speed:g} %, peak by {100 * peak:g} %',
-            f'after {1e3 * tool_state.FOLLOW_M:g} mm commanded, {1e-9 * tool_state.FOLLOW_NS:g} s: lift',
+            f'after {1e3 * tool_state.FOLLOW_M:g} mm commanded and {1e-9 * tool_state.FOLLOW_NS:g} s, without a tenth',
             f'motion after {1e-9 * ros_controllers.RESTS_WITHIN_NS:g} s is a fault',
             f'guard, {1e3 * tool_state.HEARTBEAT_S:g} ms without heartbeat',
             f'touches too light, before zeroing, within {1e3 * surface.NARROWEST_M:g} mm of another',
