@@ -226,7 +226,7 @@ def card_that_names_a_program(folder: Path) -> bytes:
 HARM: dict[str, tuple[str, Callable[[Path], bytes]]] = {
     'a pickle called model': (MODEL, lambda folder: pickle.dumps(Trap(folder / 'trapped'))),
     'a pickle among the arrays': (MODEL, pickle_among_arrays),
-    'a deep card': (CARD, lambda _: b'{"format": 1, "recipe": {"inputs": ' + b'[' * 900 + b']' * 900 + b'}}'),
+    'a deep card': (CARD, lambda _: b'{"format": 2, "recipe": {"inputs": ' + b'[' * 900 + b']' * 900 + b'}}'),
     'a card that names a program': (CARD, card_that_names_a_program),
     'an added slide as deep as can be': (EXAMPLE, lambda _: b'{"values": ' + b'[' * 100_000),
 }

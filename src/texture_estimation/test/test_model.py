@@ -102,7 +102,7 @@ def test_truncated_files_are_refused(saved, keep):
     refused(saved, 'cannot be read')
 
 
-@pytest.mark.parametrize('text', ['[]', '{}', '3', '{"format": 99}'])
+@pytest.mark.parametrize('text', ['[]', '{}', '3', '{"format": 99}', '{"format": 1, "recipe": {}}'])
 def test_foreign_cards_are_refused(saved, text):
     saved.with_suffix('.json').write_text(text)
     refused(saved, 'not the card of a model')

@@ -83,7 +83,7 @@ def part_of(kind: Any, value: Any, where: str) -> Any:
 # --------------------
 # The two files that hold a model, whatever it answers: the tree as the card NAME.json, the arrays in it as NAME.npz.
 
-FORMAT = 1
+FORMAT = 2  # the levels of the domain are by feature
 ENDINGS = ('.npz', '.json')
 MAX_BYTES = 200 * MB  # of a file of arrays; ensembles of networks over many features come to 20 MB
 MAX_UNPACKED_BYTES = 300 * MB  # predictors hold copies of arrays: so a model takes less than 1 GB
@@ -269,7 +269,9 @@ def read_card(given: str | Path) -> dict[str, Any]:
             f"model card '{path}' cannot be read: {error}; '{given}' was given; give the path of a trained model"
         ) from error
     if not isinstance(card, dict) or card.get('format') != FORMAT or not isinstance(card.get('recipe'), dict):
-        raise ModelMismatch(f"'{path}' is not the card of a model of format {FORMAT}; give the path of a trained model")
+        raise ModelMismatch(
+            f"'{path}' is not the card of a model of format {FORMAT}; give the path of one, or train again"
+        )
     return card
 
 
