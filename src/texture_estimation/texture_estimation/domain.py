@@ -13,7 +13,7 @@ import numpy as np
 
 from texture_core.errors import InvalidData
 from texture_features.correction import Correction
-from texture_features.feature_set import AGAIN, LOAD, POWER, SlideConditions
+from texture_features.feature_set import AGAIN, LOAD, POWER, RunningConditions, SlideConditions
 from texture_features.windows import Interval
 
 # --------------------
@@ -143,7 +143,7 @@ class Domain:
         rest = {name: level if name.endswith(LOAD) else level * gains[name] for name, level in self.rest.items()}
         return replace(self, rest=rest)
 
-    def deviation(self, conditions: SlideConditions) -> str:
+    def deviation(self, conditions: SlideConditions | RunningConditions) -> str:
         """Return how an exploration lies outside this domain, in one sentence; '' if it lies within."""
         found, speed, force = list[str](), conditions.speed_m_s, conditions.force_n
         if is_beyond(speed, self.speed_m_s, self.speed_margin):
@@ -170,7 +170,7 @@ class Domain:
             found.append(f'{quiet}: {UNFELT}')
         return f'{OUTSIDE}: {"; ".join(found)}' if found else ''
 
-    def quiet(self, conditions: SlideConditions) -> str:
+    def quiet(self, conditions: SlideConditions | RunningConditions) -> str:
         """Return that all channels of an exploration are as quiet as the sensor at rest; '' if not, or if unknown."""
         levels = {name: level for name, level, *_ in conditions.levels}
         if not self.rest or any(levels.get(name, math.inf) >= QUIET * rest for name, rest in self.rest.items()):

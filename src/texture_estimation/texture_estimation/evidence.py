@@ -106,7 +106,7 @@ class EvidenceAccumulator:
             self._message = f"a window was left out: its feature '{bad}' is not finite"
             return
         self._conditions.update(vector)
-        self._deviation = model.active_acceptance.domain.deviation(self._conditions.get())
+        self._deviation = model.active_acceptance.domain.deviation(self._conditions)
         scores, compared = model.predict_and_compare(vector.values)
         self._windows += 1
         self._window_ns = round(vector.window_s * NANOSECONDS)

@@ -591,13 +591,28 @@ class RunningConditions:
         for _, place, log_power in self._powers or ():
             log_power.update(float(vector.values[place]))
 
+    @property
+    def speed_m_s(self) -> float:
+        """Mean speed so far; NaN if unknown."""
+        return self._speed.value
+
+    @property
+    def force_n(self) -> float:
+        """Mean force so far; NaN if unknown."""
+        return self._force.value
+
+    @property
+    def levels(self) -> Sequence[tuple[str, float]]:
+        """Features of a power and their levels so far."""
+        return [(name, _rms(power.value)) for name, _, power in self._powers or ()]
+
     def get(self) -> SlideConditions:
         """Return the conditions of the windows so far."""
         return SlideConditions(
             self.motion,
             self.sensor,
-            self._speed.value,
-            self._force.value,
+            self.speed_m_s,
+            self.force_n,
             tuple(self.directions_rad),
             self._speed.range,
             self._force.range,
