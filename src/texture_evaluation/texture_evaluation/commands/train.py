@@ -78,7 +78,8 @@ def summary(model: TextureModel, out: Path) -> list[str]:
     training = model.training
     accuracy, slides = training['held_out_window_accuracy'], model.acceptance.domain.slides
     held_out, fewest = 'nothing was held out', min(slides.values(), default=0)
-    if accuracy is not None and fewest < LEAST_SLIDES_A_LABEL:
+    few = fewest < LEAST_SLIDES_A_LABEL
+    if accuracy is not None and few:
         needed = f'{fewest} of the {LEAST_SLIDES_A_LABEL} slides that each needs'
         held_out = f'no accuracy can be measured, as a surface has {needed}; record more'
     elif accuracy is not None:
@@ -87,7 +88,7 @@ def summary(model: TextureModel, out: Path) -> list[str]:
     return [
         f"recipe '{model.recipe.name}' trained on {len(model.labels)} surfaces: {', '.join(model.labels)}",
         f'from {training["slides"]} slides, {training["windows"]} windows of {training["window_s"]:g} s; {held_out}',
-        *_unfit(model),
+        *_unfit(model, None if few else accuracy),
         *_uneven(slides),
         *training.get('tare', []),
         *filter(
@@ -99,17 +100,13 @@ def summary(model: TextureModel, out: Path) -> list[str]:
     ]
 
 
-def _unfit(model: TextureModel) -> list[str]:
+def _unfit(model: TextureModel, accuracy: float | None) -> list[str]:
     """Return warnings that the recipe does not fit the data: no better than chance, or more windows than samples."""
-    from texture_estimation.acceptance import LEAST_SLIDES_A_LABEL
-
     training, labels = model.training, len(model.labels)
     warnings = []
     chance = 1.0 / max(labels, 1)
     margin = 1.64 * (chance * (1.0 - chance) / max(training['slides'], 1)) ** 0.5
-    accuracy = training['held_out_window_accuracy']
-    enough = min(model.acceptance.domain.slides.values(), default=0) >= LEAST_SLIDES_A_LABEL
-    if enough and accuracy is not None and labels > 1 and accuracy <= chance + margin:
+    if accuracy is not None and labels > 1 and accuracy <= chance + margin:
         warnings.append(
             f'warning: {100 * accuracy:.1f} % accuracy of held-out windows is not above chance, {100 * chance:.1f} % '
             f'of {labels} surfaces; use a recipe for this sensor and rate, or check the labels'
