@@ -153,7 +153,7 @@ def test_a_page_knows_its_dashboard_and_another_one_takes_no_command_from_it() -
     with_client(story)
 
 
-def test_each_start_of_a_dashboard_is_told_from_the_one_before() -> None:
+def test_each_start_of_a_dashboard_has_another_run_identifier() -> None:
     runs = []
 
     async def story(client, _nodes):

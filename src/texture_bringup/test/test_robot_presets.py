@@ -88,7 +88,7 @@ def test_the_page_with_the_limits_has_those_of_the_preset():
 
 @pytest.mark.parametrize('emulated', ['true', 'false'])
 @pytest.mark.parametrize(('robot', 'preset'), [('ur', 'ur5e'), ('ros_controllers', 'moveit_servo')])
-def test_a_force_limit_above_that_of_the_preset_is_said_with_both(robot, preset, emulated, tmp_path):
+def test_a_force_limit_above_that_of_the_preset_is_reported_with_both_values(robot, preset, emulated, tmp_path):
     def lines(limits):
         (tmp_path / 'mine.yaml').write_text(f'/**/explorer: {{ros__parameters: {{{limits}}}}}')
         given = {'emulated': emulated, 'device': 'x', 'explorer_params': str(tmp_path / 'mine.yaml')}

@@ -78,7 +78,10 @@ def uninterrupted() -> Iterator[None]:
         raise KeyboardInterrupt
 
 
-middleware = get_rmw_implementation_identifier  # a function: the name of the implementation of ROS that is used
+def middleware() -> str:
+    """Return the name of the implementation of ROS that is used."""
+    return str(get_rmw_implementation_identifier())
+
 
 # --------------------
 # Parameters of a node from texts, by the types that the node has declared.
