@@ -76,6 +76,21 @@ def test_slides_in_several_directions_end_with_the_first_that_fails(monkeypatch,
     assert '2 of 4 slides were made\n' in capsys.readouterr().err
 
 
+def test_what_was_asked_for_beside_a_preset_reaches_each_of_its_motions(monkeypatch):
+    nothing = TextureEstimate(0, ''), RoughnessEstimate(0, '')
+    made = ExplorationResult(ExplorationError.NONE, 'the motion was completed', 'one', *nothing)
+    operator = MagicMock()
+    operator.__enter__.return_value.explore.return_value = made
+    monkeypatch.setattr('texture_bringup.commands.explore.Operator', lambda _namespace: operator)
+    main(['explore', '--preset', 'ets-linear', '--repeats', '2', '--surface', 'oak', '--early-stopping', '--timeout', '9'])
+    main(['explore', 'linear_slide', '--repeats', '2', '--direction', '0', '90'])
+    asked = [call.args[0] for call in operator.__enter__.return_value.explore.call_args_list]
+    preset, slides = asked[:-4], asked[-4:]
+    assert preset == 2 * preset[: len(preset) // 2]
+    assert {(one.surface, one.early_stopping, one.timeout_s) for one in preset} == {('oak', True, 9.0)}
+    assert [round(math.degrees(one.direction_rad)) for one in slides] == [0, 90, 0, 90]
+
+
 def test_identify_makes_the_slide_that_distinguishes_textures_until_one_is_decided(monkeypatch, capsys):
     apart, alike = (SlideMotion('linear_slide', angle, 0.1, 2.0, 0.5) for angle in (0.0, math.pi / 4))
     slides = [

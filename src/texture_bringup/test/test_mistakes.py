@@ -201,6 +201,8 @@ def test_the_models_are_good_and_the_figures_are_written(data, capsys, tmp_path)
         ('add silk --undo', 'label of the texture'),
         ('explore linear_slid', "did you mean 'linear_slide'"),
         ('explore --preset jamali --repeats -1', '--repeats is -1'),
+        ('explore --preset ets-linear --speed 0.02 --force 0.5', '--speed, --force came with --preset, whose motions have'),
+        ('explore --preset kaboli --direction 45', '--direction came with --preset'),
         ('explore', 'give the motion, such as linear_slide, or --preset NAME'),
         ('collect cork out --force 6 3', "'force_low_n' is 6; it must not be above 'force_high_n', 3"),
         ('collect cork fast.npz', "'fast.npz' cannot be the folder of the bags: it is a file; name another"),

@@ -71,7 +71,7 @@ def _configure_explore(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('motion', nargs='?', default='', help=f'how to move: {", ".join(MOTIONS)}')
     parser.add_argument('--preset', metavar='NAME', help='make all motions of a preset instead, such as ets-linear')
     parser.add_argument(
-        '--repeats', type=int, default=0, metavar='N', help='rounds through a preset (default: as the preset declares)'
+        '--repeats', type=int, default=0, metavar='N', help='rounds (default: 1, of a preset as it declares)'
     )
     parser.add_argument('--json', action='store_true', help='print each result as one line of JSON')
     for option, _, unit, meaning in NUMBERS:
@@ -186,12 +186,24 @@ def requests_of(options: argparse.Namespace) -> list[ExplorationRequest]:
     """Return the requests given by the options, one for each direction."""
     if bool(options.motion) == bool(options.preset):
         raise InvalidParameter('give the motion, such as linear_slide, or --preset NAME')
-    if options.preset:
-        if options.repeats < 0:
-            raise InvalidParameter(f'--repeats is {options.repeats}; 1 or more rounds are needed')
-        return [replace(one, surface=options.surface) for one in load_preset(options.preset, options.repeats)]
-    find(MOTIONS, options.motion, 'motion')  # refused before the wait for an explorer
+    if options.repeats < 0:
+        raise InvalidParameter(f'--repeats is {options.repeats}; 1 or more rounds are needed')
     numbers = {field: getattr(options, option) for option, field, _, _ in NUMBERS}
+    if options.preset:
+        given = [f'--{option}' for option, field, _, _ in NUMBERS if numbers[field]]
+        given += ['--direction'] * (options.direction != [0.0]) + ['--start'] * (options.start is not None)
+        if given:
+            raise InvalidParameter(
+                f'{", ".join(given)} came with --preset, whose motions have their own values; leave that out, or give '
+                'a motion instead of the preset'
+            )
+        made = load_preset(options.preset, options.repeats)
+        early, timeout_s = options.early_stopping, options.timeout
+        return [
+            replace(one, surface=options.surface, early_stopping=early, timeout_s=one.timeout_s or timeout_s)
+            for one in made
+        ]
+    find(MOTIONS, options.motion, 'motion')  # refused before the wait for an explorer
     x_m, y_m = options.start or (0.0, 0.0)
     request = ExplorationRequest(
         options.motion,
@@ -203,7 +215,8 @@ def requests_of(options: argparse.Namespace) -> list[ExplorationRequest]:
         timeout_s=options.timeout,
         **numbers,
     )
-    return [replace(request, direction_rad=math.radians(direction)) for direction in options.direction]
+    slides = [replace(request, direction_rad=math.radians(direction)) for direction in options.direction]
+    return slides * max(options.repeats, 1)
 
 
 def show_progress(state: ExplorationState, texture: TextureEstimate) -> None:
