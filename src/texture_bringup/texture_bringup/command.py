@@ -81,6 +81,8 @@ def program() -> int:
     # Also where a shell has started the command in the background and made it ignore Ctrl-C.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # closed terminal; ignored under nohup
+        signal.signal(signal.SIGHUP, signal.default_int_handler)
     return main()
 
 
