@@ -175,8 +175,8 @@ class SlideWatch:
         if not abs(mean_m_s - asked_m_s) <= touch.mean_speed_fraction * asked_m_s:
             flaws.append(
                 f'the mean speed of the slide was {mean_m_s:.4f} m/s, more than {touch.mean_speed_fraction:.0%} off '
-                f"the {asked_m_s:g} m/s requested ('mean_speed_fraction'); check what scales the speed of the "
-                'arm'
+                f"the {asked_m_s:g} m/s requested ('mean_speed_fraction'); reduce the load of the "
+                "computer, or check what scales the arm's speed"
             )
         measured = (
             ('force', 'N', asked_n, 'peak_force_fraction'),

@@ -102,12 +102,13 @@ def test_the_correction_of_a_less_sensitive_finger_amplifies_its_noise(gain, amp
 
 def test_slides_that_prove_nothing_are_refused_with_what_to_do():
     for samples, rest, message in (
-        (slide(seconds=1.0), None, 'slide for 2 s or longer'),
+        (slide(seconds=1.8), None, 'slide for 2 s or longer'),
         (np.clip(slide(), -50.0, 50.0), None, 'the sensor is saturated; press less'),
         (slide(), slide(3), 'too little signal; see that the finger touches the plate'),
     ):
         with pytest.raises(InvalidData, match=message):
             found(samples, rest)
+    assert compare(found(slide(seconds=1.95)), found(slide())).faults == []  # asked for as 2 s
     with pytest.raises(InvalidData, match=r'the reference is of the sensor biotac.* and this one is tsf85'):
         compare(found(slide()), found(slide(), sensor='tsf85'))
 
