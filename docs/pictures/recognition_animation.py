@@ -120,8 +120,12 @@ class Panel:
         accepted = last.rejection is Rejection.NONE
         said = last.label if accepted else in_words(last.rejection)
         colour = (GREEN if accepted else RED) if over else GREY
-        end = f'{"accepted" if accepted else "rejected"} after {now_s:.1f} s:' if over else 'undecided, so far:'
-        self._show(last.probabilities, colour, f'{end}\n{said}', colour)
+        end = (
+            f'{"accepted" if accepted else "rejected"} after {now_s:.1f} s:\n{said}'
+            if over
+            else 'undecided,\nslide goes on'
+        )
+        self._show(last.probabilities, colour, end, colour)
 
     def _show(self, probabilities: Array, bar: str, text: str, colour: str) -> None:
         best = int(np.argmax(probabilities))
