@@ -13,7 +13,7 @@ pytestmark = [pytest.mark.benchmark, pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 from texture_bringup import command
-from texture_bringup.commands.explore import ABORTED, REJECTED
+from texture_bringup.commands.explore import ABORTED, NO_MODEL, REJECTED
 from texture_bringup.launcher import ChildLauncher
 from texture_bringup.operator import Operator
 
@@ -39,11 +39,13 @@ def launched(words, folder, log):
     return ChildLauncher(words[2], {**own, **given}, dict(os.environ), log)
 
 
-def ended_with(words, said):
+def ended_with(words, said, launch):
     """Return the exit code of a line: no label is accepted on this page, without a model or after eight slides."""
     if words[1] != 'explore':
         return 0
-    return ABORTED if said.startswith('no surface') else REJECTED
+    if said.startswith('no surface'):
+        return ABORTED
+    return REJECTED if any(word.startswith('model:=') for word in launch) else NO_MODEL
 
 
 def test_every_line_of_the_walkthrough_does_what_the_page_says(tmp_path, monkeypatch, capsys):
@@ -53,14 +55,14 @@ def test_every_line_of_the_walkthrough_does_what_the_page_says(tmp_path, monkeyp
     (tmp_path / 'patient.yaml').write_text(PATIENT)
     lines = LINE.findall(PAGE.read_text())
     assert len(lines) >= 12
-    launcher = None
+    launcher, launch = None, ()
     try:
         for number, (line, said) in enumerate(lines):
             words = shlex.split(line)
             if words[1] == 'launch':
                 if launcher is not None:
                     launcher.stop()
-                launcher = launched(words, tmp_path, tmp_path / f'nodes{number}.log')
+                launch, launcher = words, launched(words, tmp_path, tmp_path / f'nodes{number}.log')
                 launcher.__enter__()
                 with Operator(guard=launcher.check) as operator:
                     operator.wait_for_explorer(DEADLINE_S)
@@ -72,7 +74,7 @@ def test_every_line_of_the_walkthrough_does_what_the_page_says(tmp_path, monkeyp
             code = command.main(words[1:])
             reported = ''.join(capsys.readouterr())
             log = launcher.log.read_text() if launcher else ''
-            assert code == ended_with(words, said), line + reported + log
+            assert code == ended_with(words, said, launch), line + reported + log
             assert said in reported, line + reported + log
     finally:
         if launcher is not None:
