@@ -404,6 +404,22 @@ def test_a_rate_that_is_set_and_wrong_is_a_fault_and_one_that_cannot_be_measured
     assert adaptor.batches() == []
 
 
+@pytest.mark.parametrize(
+    ('sent', 'advice'),
+    [
+        ([n for n in range(900) if n % 16 < 7], 'messages are lost, as their times show: reduce the load'),
+        (np.cumsum(-2 * np.log(noise(1))), 'reduce the load of the computer if messages are lost'),
+        ([2 * n for n in range(300)], 'correct rate_hz in the mapping, or start the node again'),
+        ([n / 2 for n in range(900)], 'correct rate_hz in the mapping, or start the node again'),
+    ],
+    ids=['bursts of neighbours', 'random', 'half the rate', 'twice the rate'],
+)
+def test_lost_messages_are_told_from_a_wrong_rate_by_the_times_of_neighbours(sent: Any, advice: str) -> None:
+    adaptor = wrenches(rate_hz=200.0)
+    fed(adaptor, CASES['wrench', 'signal'][0], sent, 5 * MS)
+    assert f'are not published; {advice}' in adaptor.fault
+
+
 def test_a_gap_in_the_stamps_is_a_loss() -> None:
     adaptor = SignalAdaptor('signal', load_mapping('biotac_sensors').signals['signal'])
     batches = fed(adaptor, biotac_hand, [n for n in range(300) if not 230 <= n < 234], 10 * MS)
