@@ -391,6 +391,14 @@ def test_times_that_stand_still_are_a_fault_and_those_of_a_clock_that_was_set_ba
     assert (adaptor.rate_hz, adaptor.fault) == (100.0, '')
 
 
+def test_times_that_are_far_apart_as_of_a_stamp_in_another_unit_are_a_fault() -> None:
+    adaptor, make = wrenches(), CASES['wrench', 'signal'][0]
+    fed(adaptor, make, range(3), 10_000 * MS)
+    assert "times of the messages on 'wrench' are more than 0.5 s apart; correct `stamp`" in adaptor.fault
+    fed(adaptor, make, range(6000, 6300), 10 * MS)
+    assert (adaptor.rate_hz, adaptor.fault) == (100.0, '')
+
+
 def test_a_rate_that_is_set_and_wrong_is_a_fault_and_one_that_cannot_be_measured_too() -> None:
     make = CASES['wrench', 'signal'][0]
     adaptor = wrenches(rate_hz=97.0)
