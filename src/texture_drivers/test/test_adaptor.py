@@ -391,6 +391,14 @@ def test_times_that_stand_still_are_a_fault_and_those_of_a_clock_that_was_set_ba
     assert (adaptor.rate_hz, adaptor.fault) == (100.0, '')
 
 
+def test_times_that_are_far_apart_as_of_a_stamp_in_another_unit_are_a_fault() -> None:
+    adaptor, make = wrenches(), CASES['wrench', 'signal'][0]
+    fed(adaptor, make, range(3), 10_000 * MS)
+    assert "times of the messages on 'wrench' are more than 0.5 s apart; correct `stamp`" in adaptor.fault
+    fed(adaptor, make, range(6000, 6300), 10 * MS)
+    assert (adaptor.rate_hz, adaptor.fault) == (100.0, '')
+
+
 def test_a_rate_that_is_set_and_wrong_is_a_fault_and_one_that_cannot_be_measured_too() -> None:
     make = CASES['wrench', 'signal'][0]
     adaptor = wrenches(rate_hz=97.0)
@@ -402,6 +410,22 @@ def test_a_rate_that_is_set_and_wrong_is_a_fault_and_one_that_cannot_be_measured
         adaptor.take(message, START_NS)
     assert 'come unevenly, about' in adaptor.fault
     assert adaptor.batches() == []
+
+
+@pytest.mark.parametrize(
+    ('sent', 'advice'),
+    [
+        ([n for n in range(900) if n % 16 < 7], 'messages are lost, as their times show: reduce the load'),
+        (np.cumsum(-2 * np.log(noise(1))), 'reduce the load of the computer if messages are lost'),
+        ([2 * n for n in range(300)], 'correct rate_hz in the mapping, or start the node again'),
+        ([n / 2 for n in range(900)], 'correct rate_hz in the mapping, or start the node again'),
+    ],
+    ids=['bursts of neighbours', 'random', 'half the rate', 'twice the rate'],
+)
+def test_lost_messages_are_told_from_a_wrong_rate_by_the_times_of_neighbours(sent: Any, advice: str) -> None:
+    adaptor = wrenches(rate_hz=200.0)
+    fed(adaptor, CASES['wrench', 'signal'][0], sent, 5 * MS)
+    assert f'are not published; {advice}' in adaptor.fault
 
 
 def test_a_gap_in_the_stamps_is_a_loss() -> None:

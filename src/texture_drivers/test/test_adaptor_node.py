@@ -44,7 +44,7 @@ def test_messages_become_signals_and_silence_and_malformed_values_are_reported(
     graph.until(lambda: any('start the driver' in report.status[0].message for report in reports))
     assert capfd.readouterr().err == ''  # it may start after the node
     graph.until(lambda: len(reports) > 5)
-    assert "no message on '/tactile' yet; start the driver, or correct the topic" in capfd.readouterr().err
+    assert "no message on '/tactile' yet; start the driver, or correct topic and type" in capfd.readouterr().err
     numbers = itertools.count()
 
     def heard() -> bool:
@@ -86,6 +86,48 @@ def test_the_measured_rate_is_logged_and_a_change_of_it_is_an_error(graph: Local
     assert status.message.endswith('start the node again to measure it')
     log.clear()
     graph.until(lambda: logs('the sensor delivers samples', 10_000_000))
+
+
+def test_each_signal_of_a_mapping_is_watched_alone_and_announced_with_all_others(
+    graph: LocalGraph, tmp_path, capfd
+) -> None:
+    mapping = tmp_path / 'two.yaml'
+    mapping.write_text(
+        'signals:\n' + ''.join(
+            f'  {name}: {{topic: {topic}, type: std_msgs/msg/Float32MultiArray, values: [data], channels: [a, at_s], '
+            "stamp: 'data[1]', rate_hz: 100}\n"
+            for name, topic in (('signal', 'fast'), ('signal_static', 'slow'))
+        )
+    )  # fmt: skip
+    graph.add(Adaptor, mapping=str(mapping))
+    reports = graph.listen(DiagnosticArray, '/diagnostics')
+    senders = {name: graph.peer.create_publisher(Float32MultiArray, name, SENSOR_QOS) for name in ('fast', 'slow')}
+    numbers, log = itertools.count(100), []
+
+    def logs(text: str, **values: list[float]) -> bool:
+        at_s = next(numbers) / 100
+        for name, data in values.items():
+            senders[name].publish(Float32MultiArray(data=[*data, at_s]))
+            graph.spin_once(0.0)
+        log.append(capfd.readouterr().err)
+        return text in ''.join(log)
+
+    # Neither a silent signal nor one that does not fit the mapping is announced with the other.
+    graph.until(lambda: logs("no message on '/slow' yet; start the driver, or correct topic and type", fast=[1]))
+    graph.until(lambda: logs("on '/slow' the message holds 3 numbers; 2 are needed", fast=[1], slow=[1, 2]))
+    assert not logs('the sensor delivers samples')
+    for stopped, running in (('slow', 'fast'), ('fast', 'slow')):
+        graph.until(lambda: logs('the sensor delivers samples', fast=[1], slow=[1]))
+        log.clear()
+        graph.until(lambda: logs(f"no message on '/{stopped}'; start the driver", **{running: [1]}))  # noqa: B023
+        assert reports[-1].status[0].level == DiagnosticStatus.ERROR
+        assert not logs('the sensor delivers samples')
+    graph.until(lambda: logs('the sensor delivers samples', fast=[1], slow=[1]))
+    other = graph.peer.create_publisher(msg.TactileSignal, 'signal', SENSOR_QOS)
+    graph.until(
+        lambda: logs('', fast=[1], slow=[1]) and "another node publishes on '/signal'" in reports[-1].status[0].message
+    )
+    other.destroy()
 
 
 def test_a_package_that_is_missing_is_reported_in_one_sentence(graph: LocalGraph) -> None:

@@ -181,6 +181,7 @@ class PeriodMeter:
 
     def __init__(self) -> None:
         self.missing = 0.0  # fraction of the messages of the last certain stretch that did not come
+        self.sample_ns = 0.0  # median time from a sample to the next one in the last stretch
         self._messages: list[tuple[int, int]] = []  # of this stretch: samples and time, ns
         self._after_first = 0  # samples of the stretch, without the first message
 
@@ -206,6 +207,7 @@ class PeriodMeter:
         counts, times_ns = np.array(messages).T
         average_hz = counts[1:].sum() * NANOSECONDS / elapsed_ns
         steps_ns = np.diff(times_ns)
+        self.sample_ns = float(np.median(steps_ns / counts[1:]))
         near = abs(steps_ns - np.median(steps_ns)) < MOST_OFF * np.median(steps_ns)
         if not near.any() or counts.min() != counts.max():
             return average_hz, False
@@ -261,6 +263,7 @@ class SignalAdaptor:
         self._placed: list[tuple[int, Array]] = []
         self._last_number: int | None = None
         self._came_ns = 0  # time of the newest message
+        self._apart = False  # whether a silence was before it
         self._known = bool(mapping.rate_hz)  # whether there is a rate with which messages are compared
         self._start()
 
@@ -325,8 +328,14 @@ class SignalAdaptor:
 
     def _measure(self, samples: int, at_ns: int) -> None:
         """Measure the rate, anew after a silence; what is measured later is compared with it."""
-        if abs(at_ns - self._came_ns) > SILENCE_NS:
-            self._meter, self.measured, self.fault = PeriodMeter(), False, ''
+        was_apart, self._apart = self._apart, abs(at_ns - self._came_ns) > SILENCE_NS
+        if self._apart:
+            apart = (
+                f"the times of the messages on '{self.mapping.topic}' are more than 0.5 s apart; correct `stamp` in "
+                'the mapping, or let the driver send more often'
+            )
+            self.fault = apart if was_apart else ''
+            self._meter, self.measured = PeriodMeter(), False
             self._known = bool(self.mapping.rate_hz)
         self._came_ns = at_ns
         measured = self._meter.add(samples, at_ns, self.rate_hz * self.measured)
@@ -351,9 +360,15 @@ class SignalAdaptor:
                 'measured; set rate_hz in the mapping'
             )
         elif abs(rate_hz / self.rate_hz - 1) > tolerance:
+            if certain or rate_hz > self.rate_hz:
+                advice = 'correct rate_hz in the mapping, or start the node again to measure it'
+            elif abs(self._meter.sample_ns * self.rate_hz / NANOSECONDS - 1) < tolerance:
+                advice = 'messages are lost, as their times show: reduce the load of the computer'
+            else:
+                advice = 'reduce the load of the computer if messages are lost, or correct rate_hz in the mapping'
             fault = (
                 f"the messages on '{topic}' bring {rate_hz:.4g} samples a second instead of {self.rate_hz:.4g}, and "
-                'are not published; correct rate_hz in the mapping, or start the node again to measure it'
+                f'are not published; {advice}'
             )
         elif not self.measured:
             self._interrupt()
@@ -389,8 +404,7 @@ class SignalAdaptor:
         width = len(self._channels)
         if len(numbers) % width if self.mapping.consecutive else len(numbers) != width:
             raise InvalidData(
-                f"the message on '{self.mapping.topic}' holds {len(numbers)} numbers; {width} are needed, one for each "
-                'channel of the mapping'
+                f'the message holds {len(numbers)} numbers; {width} are needed, one for each channel of the mapping'
             )
         return numbers.reshape(-1, width)
 

@@ -86,7 +86,9 @@ def test_a_tare_is_requested_and_the_baseline_is_published_and_subtracted(graph:
     assert np.abs(signal[-1].samples).max() == 0.0
 
 
-def test_drift_while_nothing_touches_is_named_on_diagnostics(graph: LocalGraph, tmp_path: Path) -> None:
+def test_drift_while_nothing_touches_and_another_publisher_are_named_on_diagnostics(
+    graph: LocalGraph, tmp_path: Path
+) -> None:
     rng, drift = np.random.default_rng(0), [0]
 
     def feed(device: Any, first: int, ticks: int) -> None:
@@ -108,6 +110,8 @@ def test_drift_while_nothing_touches_is_named_on_diagnostics(graph: LocalGraph, 
         graph.until(lambda: baselines)
         drift[0] = 2000
         graph.until(lambda: reports and 'c0 has drifted' in reports[-1].status[0].message)
+        graph.peer.create_publisher(msg.TactileSignal, 'signal', SENSOR_QOS)
+        graph.until(lambda: "another node publishes on '/signal'" in reports[-1].status[0].message)
 
 
 def test_a_tare_without_a_sensor_is_refused(graph: LocalGraph, tmp_path: Path) -> None:

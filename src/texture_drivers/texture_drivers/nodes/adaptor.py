@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import importlib
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -18,10 +19,12 @@ from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.ros import SENSOR_QOS, DiagnosticReport, Diagnostics, declare, frame_name, run, to_msg
 from texture_drivers.adaptor import AdaptorMapping, SignalAdaptor, load_mapping
 from texture_drivers.health import BEFORE_THE_START
+from texture_drivers.nodes.sensor import shared_topic
 from texture_drivers.sensor import BatchParams
 
 MOST_MISSING = 0.05  # of the messages: of fewer the frequencies are off by less
-QUIET_REPORTS = 5  # on an error, one each second, before it is logged: the driver may start after the node
+# So many reports of an error in a row, one each second, log it: the driver may start after the node.
+FIRST_REPORTS, LATER_REPORTS = 5, 2
 
 
 def import_message(message_type: str) -> Any:
@@ -67,29 +70,36 @@ class Adaptor(Node):
         self._publishers_of = {
             name: self.create_publisher(msg.TactileSignal, name, SENSOR_QOS) for name in self._adaptors
         }
-        self._received = self._lost = self._errors = 0
-        self._fault = ''
-        self._delivers = False
+        self._lost = 0
+        self._received: Counter[tuple[str, str]] = Counter()  # messages by signal and topic
+        self._reported = self._received.copy()  # those of them before the last report
+        self._refusals: dict[str, str] = {}  # the newest since the last report, by signal
+        self._delivering: set[str] = set()  # signals, until an error of theirs is logged
+        self._patience = dict.fromkeys(self._adaptors, FIRST_REPORTS)  # reports until an error is logged
         self._rates_hz = {name: adaptor.rate_hz for name, adaptor in self._adaptors.items()}
-        for adaptor in self._adaptors.values():
+        for name, adaptor in self._adaptors.items():
             wanted = adaptor.mapping
-            self._listen(wanted.topic, wanted.type, adaptor.take)
+            self._listen(name, wanted.topic, wanted.type, adaptor.take)
             if wanted.number_topic:
-                self._listen(wanted.number_topic, wanted.number_type, adaptor.take_number)
+                self._listen(name, wanted.number_topic, wanted.number_type, adaptor.take_number)
         self.create_timer(params.batch_s, self._publish)
         self._diagnostics = Diagnostics(self, self._report)
 
-    def _listen(self, topic: str, message_type: str, take: Callable[[Any, int], None]) -> None:
+    def _listen(self, signal: str, topic: str, message_type: str, take: Callable[[Any, int], None]) -> None:
         """Subscribe; a message is passed on with the time at which it was sent."""
 
         def on_message(message: Any, info: Mapping[str, int]) -> None:
-            self._received += 1
+            if not self._received[stream]:
+                self._patience[signal] = LATER_REPORTS
+            self._received[stream] += 1
             try:
                 take(message, info['source_timestamp'])
             except InvalidData as error:
-                self._fault = str(error)
+                self._refusals[signal] = f"on '{stream[1]}' {error}"
 
         self.create_subscription(self._messages[message_type], topic, on_message, SENSOR_QOS)
+        stream = signal, self.resolve_topic_name(topic)
+        self._received[stream] = 0
 
     def _publish(self) -> None:
         for name, adaptor in self._adaptors.items():
@@ -100,29 +110,40 @@ class Adaptor(Node):
                 )
             for batch in adaptor.batches():
                 self._publishers_of[name].publish(to_msg(batch))
-                if not self._delivers:
-                    self._delivers = True
-                    self.get_logger().info('the sensor delivers samples')
+                if name not in self._delivering and self._patience[name] > 0:
+                    self._delivering.add(name)
+                    if len(self._delivering) == len(self._adaptors):
+                        self.get_logger().info('the sensor delivers samples')
+
+    def _errors(self) -> str:
+        """Return what was wrong with the signals since the last report, and log it once if it lasts."""
+        silent = [stream for stream, count in self._received.items() if count == self._reported[stream]]
+        yet = '' if any(self._received[stream] for stream in silent) else ' yet'
+        topics = ', '.join(sorted({f"'{topic}'" for _, topic in silent}))
+        silence = f'no message on {topics}{yet}; start the driver, or correct topic and type in the mapping'
+        found = {name: adaptor.fault for name, adaptor in self._adaptors.items()}
+        found |= dict.fromkeys((name for name, _ in silent), silence) | self._refusals
+        self._reported, self._refusals = self._received.copy(), {}
+        for name, error in found.items():
+            self._patience[name] = self._patience[name] - 1 if error else LATER_REPORTS
+        sentence = '; '.join(dict.fromkeys(filter(None, found.values())))
+        lasting = {name for name, reports in self._patience.items() if reports == 0}
+        if lasting:
+            self._delivering -= lasting
+            self.get_logger().warning(sentence)
+        return sentence
 
     def _report(self) -> DiagnosticReport:
         adaptors = list(self._adaptors.values())
-        received, fault = self._received, self._fault
-        rate_fault = next((adaptor.fault for adaptor in adaptors if adaptor.fault), '')
-        self._received, self._fault = 0, ''
+        error = self._errors()
         exact = all(adaptor.mapping.number for adaptor in adaptors)
         missing = max(adaptor.missing for adaptor in adaptors)
         lost = sum(adaptor.lost for adaptor in adaptors)
         new, self._lost = lost - self._lost, lost
-        topics = ', '.join(sorted({f"'{self.resolve_topic_name(one.mapping.topic)}'" for one in adaptors}))
-        yet = '' if any(one.samples or one.refused for one in adaptors) else ' yet'
+        shared = shared_topic(self, self._publishers_of.values())
         conditions = (
-            (bool(fault), 'ERROR', fault),
-            (
-                received == 0,
-                'ERROR',
-                f'no message on {topics}{yet}; start the driver, or correct the topic in the mapping',
-            ),
-            (bool(rate_fault), 'ERROR', rate_fault),
+            (bool(error), 'ERROR', error),
+            (bool(shared), 'WARN', shared),
             (new > 0, 'WARN', f'{new} samples lost since the last report'),
             (not all(one.measured for one in adaptors), 'WARN', 'measuring rates and times, in 2 s without a silence'),
             (
@@ -133,11 +154,6 @@ class Adaptor(Node):
             ),
         )
         level, sentence = next(((level, text) for holds, level, text in conditions if holds), ('OK', 'converting'))
-        self._errors = self._errors + 1 if level == 'ERROR' else 0
-        if self._errors == QUIET_REPORTS:
-            # A rate withholds one signal; the others go on.
-            self._delivers &= sentence == rate_fault and not all(adaptor.fault for adaptor in adaptors)
-            self.get_logger().warning(sentence)
         values = {
             'samples': sum(adaptor.samples for adaptor in adaptors),
             'lost': lost,

@@ -5,12 +5,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
+from rclpy.node import Node
 from sensor_msgs.msg import Imu
 from std_srvs.srv import Trigger
 from texture_msgs import msg
@@ -200,7 +201,15 @@ class SensorNode(PatientLifecycleNode):
         if self._reader is None:
             return 'WARN', 'the sensor is not active', {}
         self._diagnostics.hardware_id = self._health.details.get('serial number', self._device)
-        return self._health.report(time.monotonic())
+        level, sentence, numbers = self._health.report(time.monotonic())
+        shared = '' if level == 'ERROR' else shared_topic(self, self._topics.values())
+        return ('WARN', shared, numbers) if shared else (level, sentence, numbers)
+
+
+def shared_topic(node: Node, publishers: Iterable[Any]) -> str:
+    """Return a warning of a topic that another node publishes too, '' if there is none."""
+    taken = [one.topic_name for one in publishers if node.count_publishers(one.topic_name) > 1]
+    return f"another node publishes on '{taken[0]}' too, and the samples of both are mixed; end it" if taken else ''
 
 
 def imu_messages(message: msg.TactileSignal, signal: TactileSignal) -> Iterator[Imu]:
