@@ -17,7 +17,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from texture_core.config import param
-from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.errors import InvalidData, InvalidParameter, TextureError
 from texture_core.ros import DiagnosticReport, Diagnostics, declare, run
 from texture_core.types import ENDED, Quality, TactileSignal
 from texture_recordings.bags import COMMON, MESSAGES, BagWriter, Continuity, RawMessage, decode, typestore
@@ -61,7 +61,7 @@ class RecordNode(Node):
         self._continuity = Continuity()
         self._exploring: dict[str, str] = {}  # id of the exploration that is recorded, '' if none, by topic
         self._queue: queue.Queue[RawMessage | None] = queue.Queue(QUEUE)
-        self._error: OSError | None = None
+        self._error: TextureError | None = None
         self._writer = threading.Thread(target=self._write, name='writer')
         self._writer.start()
         self._namespace = self.get_namespace().rstrip('/')
@@ -81,8 +81,8 @@ class RecordNode(Node):
         self._writer.join()
         try:
             self._bag.close()
-        except OSError as error:
-            self.get_logger().error(f"'{self._path}' cannot be completed: {error}; free some space and record again")
+        except TextureError as error:
+            self.get_logger().error(f'the bag is not complete: {error}')
         else:
             self.get_logger().info(f"'{self._path}' is complete: {self._report()[1]}")
             self._diagnostics.end()
@@ -137,7 +137,7 @@ class RecordNode(Node):
                 if time.monotonic() - flushed_s >= FLUSH_S:
                     flushed_s = time.monotonic()
                     self._bag.flush()
-            except OSError as error:  # noqa: PERF203 - what comes later may fit
+            except TextureError as error:  # noqa: PERF203 - what comes later may fit
                 self._error = self._error or error
 
     def _note(self, message: RawMessage) -> None:
@@ -160,7 +160,7 @@ class RecordNode(Node):
 
     def _check(self) -> None:
         if self._error is not None:
-            raise InvalidData(f"'{self._path}' cannot be written: {self._error}; free some space and record again")
+            raise self._error
 
     def _report(self) -> DiagnosticReport:
         lost = sum(self._continuity.lost.values())
