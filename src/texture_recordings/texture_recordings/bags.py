@@ -400,6 +400,9 @@ def _folder(topic: str) -> str:
 # Find and read recordings: rosbag2 folders with MCAP inside, which `ros2 bag` opens too; no ROS is needed.
 
 
+BagPaths = str | Path | Iterable[str | Path]
+
+
 class RawMessage(NamedTuple):
     """One message as stored in a bag."""
 
@@ -439,9 +442,9 @@ def is_cut_off(path: Path) -> bool:
     return False
 
 
-def find_bags(paths: Iterable[str | Path]) -> list[Path]:
-    """Return the bags of all `paths`, in the order given."""
-    found = [bag for path in paths for bag in bags_in(path)]
+def find_bags(paths: BagPaths) -> list[Path]:
+    """Return the bags of all `paths`, or of one, in the order given."""
+    found = [bag for path in ([paths] if isinstance(paths, str | Path) else paths) for bag in bags_in(path)]
     if not found:
         raise InvalidData('no bag was given; name one or more bags, or a folder of bags')
     return found

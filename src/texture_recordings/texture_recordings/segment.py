@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,13 +11,13 @@ from texture_core.cli import progress
 from texture_core.errors import InvalidData
 from texture_core.types import Phase, TactileSignal
 from texture_features.segmentation import SegmentationParams, segment_recording
-from texture_recordings.bags import EXPLORATION, BagWriter, find_bags, new_folder, read_bag, read_named
+from texture_recordings.bags import EXPLORATION, BagPaths, BagWriter, find_bags, new_folder, read_bag, read_named
 
 FAST_TOPIC = 'signal'
 
 
 def segment_bags(
-    bags: Iterable[str | Path], out: Path, params: SegmentationParams, surface: str, namespace: str | None = None
+    bags: BagPaths, out: Path, params: SegmentationParams, surface: str, namespace: str | None = None
 ) -> dict[Path, int]:
     """Copy bags, their exploration states replaced by those found in the signals; return the slides in each copy.
 
@@ -39,8 +38,8 @@ def _segment(path: Path, out: Path, params: SegmentationParams, surface: str, na
             signals.append(value)
         elif value.phase is Phase.SLIDE:
             raise InvalidData(
-                f"the bag '{path}' has the slides of the explorer already, with surface '{value.surface}', speed and "
-                'force; use it as it is, and name bags without exploration states here'
+                f"the bag '{path}' has slides already, the first over '{value.surface}'; use it as it is, and give "
+                'only bags without exploration states here'
             )
     if not signals:
         raise InvalidData(f"the bag '{path}' has no '{FAST_TOPIC}' to find slides in; also record the vibration")
