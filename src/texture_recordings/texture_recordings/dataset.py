@@ -190,6 +190,7 @@ class SlideDataset:
                 names = (channels or {}).get(topic) or [f'c{number}' for number in range(samples.shape[1])]
                 batches[topic] = TactileSignal(start_ns, sensor or topic, tuple(names), (), rates_hz[topic], 0, samples)
             duration_ns = max(batch.end_ns for batch in batches.values()) - start_ns
+            known: dict[str, Any] = {column: float(values[index]) for column, values in numbers.items()}
             state = ExplorationState(
                 start_ns,
                 f'{session or "array"}/{index}',
@@ -197,7 +198,7 @@ class SlideDataset:
                 Phase.SLIDE,
                 duration_ns / NANOSECONDS,
                 surface=surface,
-                **{column: float(values[index]) for column, values in numbers.items()},
+                **known,
             )
             slides.append(
                 LabelledSlide(
