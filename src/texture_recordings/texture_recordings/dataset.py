@@ -189,14 +189,14 @@ class SlideDataset:
                 samples = _samples_of(arrays[index], rates_hz[topic], f"'{topic}' of slide {index + 1}")
                 names = (channels or {}).get(topic) or [f'c{number}' for number in range(samples.shape[1])]
                 batches[topic] = TactileSignal(start_ns, sensor or topic, tuple(names), (), rates_hz[topic], 0, samples)
-            duration_ns = max(batch.end_ns for batch in batches.values()) - start_ns
+            end_ns = max(batch.end_ns for batch in batches.values())
             known: dict[str, Any] = {column: float(values[index]) for column, values in numbers.items()}
             state = ExplorationState(
                 start_ns,
                 f'{session or "array"}/{index}',
                 motion,
                 Phase.SLIDE,
-                duration_ns / NANOSECONDS,
+                (end_ns - start_ns) / NANOSECONDS,
                 surface=surface,
                 **known,
             )
@@ -208,7 +208,7 @@ class SlideDataset:
                     states=(state,),
                 )
             )  # fmt: skip
-            start_ns = max(batch.end_ns for batch in batches.values()) + GAP_NS
+            start_ns = end_ns + GAP_NS
         return cls(tuple(number_slides(slides)))
 
     def __len__(self) -> int:
@@ -602,6 +602,6 @@ def _samples_of(array: AnyArray, rate_hz: float, where: str) -> NDArray[np.float
     if finite < 2 or len(samples) < min(samples.shape[1], SlideBorders.min_s * rate_hz):
         raise InvalidData(
             f'{where} has the shape {given.shape} of {given.dtype} with {finite} finite samples; real numbers '
-            '(n_samples, n_channels) are needed: transpose an array that lies on its side, leave out a slide without any'
+            '(n_samples, n_channels) are needed: transpose an array on its side, leave out a slide without any'
         )
     return samples.astype(np.float32)
