@@ -111,6 +111,8 @@ def usable(target: Path) -> Iterator[None]:
 def model_stem(path: str | Path) -> Path:
     """Return the path without the ending of either file."""
     path = Path(path).expanduser()
+    if path.name in ('', '..'):
+        raise ModelMismatch(f"'{path}' is a folder, and no name of a model; give a path such as models/mine")
     return path.with_suffix('') if path.suffix in ENDINGS else path
 
 

@@ -20,43 +20,53 @@ def bag(tmp_path_factory):
     return write_simulated(folder, SlidePlan(slides=3, slide_s=1.0), np.random.default_rng(2), surfaces=[SURFACE])[0]
 
 
+def without_states(bag, path, topics=('signal', 'signal_static')):
+    with BagWriter(path) as writer:
+        for topic, log_ns, value in read_bag(bag, topics):
+            writer.write(f'left/{topic}', value, log_ns)
+    return path
+
+
 def slides_of(path):
     states = [value for _, _, value in read_bag(path, ('exploration',))]
     begun = [state for state in states if state.phase is Phase.SLIDE]
     ids = dict.fromkeys(state.exploration_id for state in begun)
-    return [next(state for state in begun if state.exploration_id == name) for name in ids], states
+    return [next(state for state in begun if state.exploration_id == name) for name in ids]
 
 
 def test_the_slides_found_are_those_that_the_explorer_reported(bag, tmp_path):
-    [(path, count)] = segment_bags([bag], tmp_path / 'found', SegmentationParams()).items()
-    (reported, _), (found, _) = slides_of(bag), slides_of(path)
+    bare = without_states(bag, tmp_path / 'bare')
+    [(path, count)] = segment_bags(bare, tmp_path / 'found', SegmentationParams(), 'oak').items()
+    reported, found = slides_of(bag), slides_of(path)
     assert count == len(found) == len(reported) == 3
     for true, measured in zip(reported, found, strict=True):
         assert measured.stamp_ns == pytest.approx(true.stamp_ns, abs=60e6)
         assert measured.steady_s == pytest.approx(0.95, abs=0.1)
-        assert (measured.surface, measured.speed_m_s) == (SURFACE, 0.1)
-    assert [slide.number for slide in find_slides([path])] == [1, 2, 3]
-
-
-def test_a_bag_without_states_gets_labelled_slides(bag, tmp_path):
-    bare = tmp_path / 'bare'
-    with BagWriter(bare) as writer:
-        for topic, log_ns, value in read_bag(bag, ('signal', 'signal_static')):
-            writer.write(f'left/{topic}', value, log_ns)
-    [path] = segment_bags([bare], tmp_path / 'found', SegmentationParams(), surface='oak')
     assert [slide.name for slide in find_slides([path])] == ['oak/1', 'oak/2', 'oak/3']
 
 
-def test_a_bag_without_vibration_gets_one_sentence(bag, tmp_path):
-    bare = tmp_path / 'bare'
-    with BagWriter(bare) as writer:
-        for topic, log_ns, value in read_bag(bag, ('signal_static',)):
-            writer.write(topic, value, log_ns)
+def test_a_bag_without_vibration_gets_one_sentence_and_no_bag_stays(bag, tmp_path):
+    bags = [without_states(bag, tmp_path / 'a'), without_states(bag, tmp_path / 'b', ('signal_static',))]
     with pytest.raises(InvalidData, match='record the vibration'):
-        segment_bags([bare], tmp_path / 'found', SegmentationParams())
+        segment_bags(bags, tmp_path / 'found', SegmentationParams(), 'oak')
+    assert not (tmp_path / 'found').exists()
+
+
+def test_a_bag_with_labelled_slides_is_refused_and_keeps_them(bag, tmp_path):
+    with pytest.raises(InvalidData, match=f"'{bag}' has slides already, the first over '{SURFACE}'; use it as it is"):
+        segment_bags([bag], tmp_path / 'found', SegmentationParams(), 'oak')
+    assert not (tmp_path / 'found').exists()
+
+
+def test_nothing_stays_on_a_disk_that_is_too_small(bag, tmp_path, fill_disk):
+    bare = without_states(bag, tmp_path / 'bare')
+    fill_disk()
+    with pytest.raises(InvalidParameter, match="found/bare' cannot be written: File too large"):
+        segment_bags(bare, tmp_path / 'found', SegmentationParams(), 'oak')
+    assert not (tmp_path / 'found').exists()
 
 
 def test_nothing_is_written_into_a_folder_that_exists(bag, tmp_path):
     (tmp_path / 'found').mkdir()
     with pytest.raises(InvalidParameter, match="found' exists already; nothing is overwritten, name another folder"):
-        segment_bags([bag], tmp_path / 'found', SegmentationParams())
+        segment_bags([bag], tmp_path / 'found', SegmentationParams(), 'oak')

@@ -50,8 +50,9 @@ def write(path: Path, dataset: SlideDataset) -> Path:
 
 def test_a_bag_gives_the_same_data_set_as_the_arrays_that_it_holds(tmp_path: Path) -> None:
     given = from_arrays()
-    read = SlideDataset.from_bags([write(tmp_path / 'bag', given)])
+    read = SlideDataset.from_bags(write(tmp_path / 'bag', given))
     assert read.names.tolist() == given.names.tolist()
+    assert len(SlideDataset.from_bags(str(tmp_path), '1-2')) == 4
     assert read.condition('speed').tolist() == given.condition('speed').tolist()
     one, other = given.features(FEATURES), read.features(FEATURES)
     np.testing.assert_array_equal(one.X, other.X)
@@ -105,7 +106,20 @@ def test_each_slide_has_its_conditions(condition: str, expected: list) -> None:
     ('arguments', 'sentence'),
     [
         (({'signal': arrays()[:5]}, LABELS, {'signal': RATE_HZ}), "'signal' has 5 slides"),
-        (({'signal': arrays()}, LABELS, {}), 'the rate None'),
+        (({'signal': arrays()}, LABELS, {}), 'the rates are {}; give one array'),
+        (({'signal': arrays()}, LABELS, 1000.0), 'the rates are 1000.0; give one array'),
+        (({'signal': arrays()}, 'corkfe', {'signal': RATE_HZ}), 'has 6 slides for 1 labels'),
+        (({'signal': arrays()}, [*LABELS[:5], ' '], {'signal': RATE_HZ}), 'slide 6 has an empty label'),
+        (({'signal': arrays()}, ['a/b', *LABELS[1:]], {'signal': RATE_HZ}), "the label 'a/b' has a slash"),
+        *(
+            (({'signal': [bad, *arrays()[1:]]}, LABELS, {'signal': RATE_HZ}), f"'signal' of slide 1 has .*{sentence}")
+            for bad, sentence in (
+                (np.ones((1, 2000)), r'\(1, 2000\) of float64 with 1 finite .* transpose an array'),
+                (np.ones((3, 2000)), r'\(3, 2000\) .* transpose an array'),
+                (np.full((2000, 2), np.nan), 'with 0 finite samples'),
+                (np.ones(2000) * 1j, 'of complex128'),
+            )
+        ),
         (({}, LABELS, {}), 'no signal was given'),
         (({'signal': []}, [], {'signal': RATE_HZ}), 'the data set has no slide'),
     ],
@@ -113,6 +127,20 @@ def test_each_slide_has_its_conditions(condition: str, expected: list) -> None:
 def test_arrays_that_contradict_each_other_are_refused(arguments: tuple, sentence: str) -> None:
     with pytest.raises(InvalidData, match=sentence):
         SlideDataset.from_arrays(*arguments)
+
+
+@pytest.mark.parametrize(
+    ('conditions', 'sentence'),
+    [
+        ({'speed_m_s': [*SPEEDS[:5], 50.0]}, 'the speed of a slide is 50 m/s, plausible are .* may be cm/s or mm/s'),
+        ({'force_n': math.inf}, 'the force of a slide is inf N, plausible are 1 mN to 100 N'),
+        ({'direction_rad': 90}, 'the direction of a slide is 90 rad, .* its unit, which may be deg'),
+        ({'force_n': [1.0]}, r'force_n has the shape \(1,\)'),
+    ],
+)
+def test_conditions_that_no_finger_reaches_are_refused(conditions: dict, sentence: str) -> None:
+    with pytest.raises(InvalidData, match=sentence):
+        from_arrays(**conditions)
 
 
 def test_lost_samples_leave_windows_out_but_are_refused_where_all_are_needed(tmp_path: Path) -> None:

@@ -197,6 +197,7 @@ def test_a_bag_with_other_messages_is_refused_and_an_empty_one_yields_nothing(tm
 WRITER = """
 import os, resource, signal, sys
 import numpy as np
+from texture_core.errors import InvalidParameter
 from texture_core.types import TactileSignal
 from texture_recordings.bags import BagWriter
 
@@ -211,7 +212,7 @@ try:
         if number % 10 == 9:
             bag.flush()
             print(number + 1, flush=True)
-except OSError:
+except InvalidParameter:
     pass
 os.kill(os.getpid(), signal.SIGKILL)
 """

@@ -74,6 +74,18 @@ def test_a_slide_that_lost_samples_is_left_out_of_that_stream_and_counted(datase
     assert parquet.ParquetFile(tmp_path / 'out/signal_static.parquet').num_row_groups == 4
 
 
+def test_nothing_stays_of_an_export_or_an_import_for_which_the_disk_is_too_small(dataset, tmp_path, fill_disk) -> None:
+    export_slides(dataset, tmp_path / 'out')
+    mapping = load_mapping(tmp_path / 'out' / 'signal.yaml')
+    fill_disk()
+    with pytest.raises(InvalidParameter, match=r"'.*bags/monday' cannot be written: File too large; name another fold"):
+        import_tables(mapping, tmp_path / 'out', tmp_path / 'bags')
+    with pytest.raises(InvalidParameter, match=r"'.*signal.parquet' cannot be written: .*File too large"):
+        export_slides(dataset, tmp_path / 'again')
+    assert not (tmp_path / 'again').exists()
+    assert not list((tmp_path / 'bags').iterdir())
+
+
 def test_what_cannot_be_exported_is_refused_with_a_sentence(dataset, tmp_path) -> None:
     with pytest.raises(InvalidParameter, match='nothing is overwritten'):
         export_slides(dataset, tmp_path)

@@ -471,6 +471,11 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
             (50, overlapping(50, 50), [('cork', row) for row in overlapping(50, 50)]),
         )
     },
+    'windows in rows that are called trials': (
+        npz(X=overlapping(50, 20)),
+        {**ANY, 'streams': {'signal': BY_ROW}, 'slides': {'by': 'column', 'column': 'trial'}},
+        r"no column 'trial'.* Known: X.0, (X.\d+, ){9}… \(52\); .* write slides: \{by: row\} and `samples_per_row`",
+    ),
     'trials that overlap': (
         npz(X=overlapping(50, 20)[..., None]),
         {**ANY, 'streams': {'signal': BY_ROW}, 'slides': {'by': 'column', 'column': 'trial'}}, SAME,
@@ -710,6 +715,12 @@ ROWS: dict[str, tuple[Write, dict, Truth]] = {
         lambda folder: (folder / 'cork_1.csv').write_bytes(('n,x [m/s²]\n' + lines(range(N), X)).encode('cp1252')),
         {'streams': {'signal': {'columns': ['x [m/s²]'], 'rate_hz': 100.0}}}, CORK,
     ),
+    **{
+        f'a time as {first}': (
+            csv([f'{first}{t:06.3f}' for t in T], X), {}, f"'{first}00.000' is not a finite number; dates are not read",
+        )
+        for first in ('2026-03-01 10:00:', '1/3/2026 10:00:', '10:00:')
+    },
     'decimal commas': (text('n;x\n' + '1;0,5\n' * 200), RATE, "'0,5' is not a finite number; if commas are decimal"),
     'points of thousands': (
         text('n;x\n' + ''.join(f'{n};{x.replace(",", ".")}\n' for n, x in enumerate(THOUSANDS))), GERMAN,

@@ -3,6 +3,7 @@
 """A machine that only records needs the messages, the core, the drivers and this package, and no numerical library."""
 
 import os
+import resource
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -130,6 +131,20 @@ def test_what_a_recorder_has_until_a_second_before_it_is_killed_is_read(tmp_path
         graph.until(lambda: recorded(reports[:-6]) > 300)  # reports of the last three seconds
         record.kill()
     assert samples_in_order(tmp_path / 'bag') > 1000
+
+
+def test_a_recorder_on_a_full_disk_ends_with_one_sentence_and_keeps_what_it_has(tmp_path: Path) -> None:
+    file = tmp_path / 'bag' / 'bag.mcap'
+    with recording(tmp_path) as (graph, reports, record, _):
+        graph.until(lambda: recorded(reports) > 300 and file.stat().st_size > 10_000)  # more than the log
+        resource.prlimit(record.pid, resource.RLIMIT_FSIZE, (file.stat().st_size + 100, -1))
+        graph.until(lambda: record.poll() is not None)
+    log = (tmp_path / 'record.log').read_text()
+    assert record.returncode == 2, log
+    assert "bag' cannot be written: File too large; name another folder, or free some space" in log
+    assert 'Traceback' not in log
+    assert 'FATAL' not in log
+    assert samples_in_order(tmp_path / 'bag') > 300
 
 
 @pytest.mark.parametrize('module', ['texture_features.features.spectral', 'scipy.signal'])

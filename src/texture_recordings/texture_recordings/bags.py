@@ -14,7 +14,7 @@ import struct
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import replace
 from functools import cache, partial
 from itertools import accumulate, pairwise
@@ -25,8 +25,8 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.config import MB, FileRefused, folder, open_regular, parse_yaml, read_text
-from texture_core.errors import InvalidData, MissingLibrary, TextureError
+from texture_core.config import MB, FileRefused, folder, open_regular, parse_yaml, read_text, writing
+from texture_core.errors import InvalidData, InvalidParameter, MissingLibrary, TextureError
 from texture_core.types import (
     DATA_CLASSES,
     NANOSECONDS,
@@ -400,6 +400,9 @@ def _folder(topic: str) -> str:
 # Find and read recordings: rosbag2 folders with MCAP inside, which `ros2 bag` opens too; no ROS is needed.
 
 
+BagPaths = str | Path | Iterable[str | Path]
+
+
 class RawMessage(NamedTuple):
     """One message as stored in a bag."""
 
@@ -439,9 +442,9 @@ def is_cut_off(path: Path) -> bool:
     return False
 
 
-def find_bags(paths: Iterable[str | Path]) -> list[Path]:
-    """Return the bags of all `paths`, in the order given."""
-    found = [bag for path in paths for bag in bags_in(path)]
+def find_bags(paths: BagPaths) -> list[Path]:
+    """Return the bags of all `paths`, or of one, in the order given."""
+    found = [bag for path in ([paths] if isinstance(paths, str | Path) else paths) for bag in bags_in(path)]
     if not found:
         raise InvalidData('no bag was given; name one or more bags, or a folder of bags')
     return found
@@ -637,6 +640,7 @@ class Continuity:
 # --------------------
 # Write recordings: rosbag2 folders with MCAP inside, which `ros2 bag` opens too; no ROS is needed.
 
+OTHER_PLACE = 'folder, or free some space'  # if one cannot be written
 FOREVER = QosTime(2147483647, 4294967295)
 
 
@@ -663,6 +667,20 @@ def refuse_existing(path: str | Path) -> None:
         raise InvalidData(f"'{path}' exists already; a bag is never overwritten, name another or remove it")
 
 
+@contextmanager
+def new_folder(path: Path) -> Iterator[None]:
+    """Make a folder for what a `with` block writes into it, and remove it if that ends with an error."""
+    if path.exists():
+        raise InvalidParameter(f"'{path}' exists already; nothing is overwritten, name another folder or remove it")
+    try:
+        with writing(path, OTHER_PLACE):
+            path.mkdir(parents=True)
+            yield
+    except BaseException:
+        shutil.rmtree(path, ignore_errors=True)
+        raise
+
+
 class BagWriter:
     """Write a new bag; use it in a `with` block, at the end of which the bag is complete."""
 
@@ -673,10 +691,8 @@ class BagWriter:
         refuse_existing(self.path)
         self._writer = Writer(self.path, version=8, storage_plugin=StoragePlugin.MCAP)
         self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
-        try:
+        with writing(path, OTHER_PLACE):
             self._writer.open()
-        except OSError as error:
-            raise InvalidData(f"no bag can be made at '{path}': {error.strerror}; name another place") from error
         storage: Any = self._writer.storage
         self._storage = storage
         # rosbags writes 0 for the checksum of a chunk, so that a whole chunk would look like one that the disk
@@ -693,19 +709,23 @@ class BagWriter:
         key = message.topic, message.msgtype
         if key not in self._connections:
             self._connections[key] = self._connect(*key)
-        self._writer.write(self._connections[key], message.log_ns, message.data)
+        with writing(self.path, OTHER_PLACE):
+            self._writer.write(self._connections[key], message.log_ns, message.data)
 
     def flush(self) -> None:
         """Bring to the disk what was written: it can be read whatever happens to this process or machine."""
-        if self._storage.chunk.msgs:
-            self._storage.close_chunk()
-        self._storage.bio.flush()
-        os.fsync(self._storage.bio.fileno())
+        with writing(self.path, OTHER_PLACE):
+            if self._storage.chunk.msgs:
+                self._storage.close_chunk()
+            self._storage.bio.flush()
+            os.fsync(self._storage.bio.fileno())
 
     def close(self) -> None:
         """Complete the bag."""
-        self._writer.close()
-        with self._storage.path.open('r+b') as file:
+        # Of a disk that is full the file is closed without what is waiting for it.
+        with writing(self.path, OTHER_PLACE), closing(self._storage.bio.raw):
+            self._writer.close()
+        with writing(self.path, OTHER_PLACE), self._storage.path.open('r+b') as file:
             file.seek(-FOOTER_BYTES, os.SEEK_END)
             file.seek(int.from_bytes(file.read(FOOTER_BYTES)[9:17], 'little'))
             checksum = crc32(file.read()[:-CHECKSUM_FROM_END])
@@ -771,6 +791,7 @@ class SlideBags:
     def __init__(self, out: str | Path | None) -> None:
         self._out = None if out is None else Path(out)
         self._open = ExitStack()
+        self._open.push(self._remove)
         self._bags: dict[str, BagWriter] = {}
         self._next: Counter[tuple[str, str]] = Counter()
         self._now_ns = START_NS
@@ -823,6 +844,8 @@ class SlideBags:
 
     def __exit__(self, *error: Any) -> None:
         self._open.__exit__(*error)
-        if error[0]:
-            for path in self.paths:
-                shutil.rmtree(path, ignore_errors=True)
+
+    def _remove(self, error: type[BaseException] | None, *_: object) -> None:
+        """Remove the bags, which are closed, after an error; also after one of closing them."""
+        for path in self.paths if error else ():
+            shutil.rmtree(path, ignore_errors=True)

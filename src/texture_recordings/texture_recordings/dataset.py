@@ -25,10 +25,12 @@ from texture_core.types import (
     Phase,
     TactileSignal,
     Window,
+    checked_label,
 )
 from texture_features.feature_set import ONE_RATE, LabelledFeatures
 from texture_features.windows import CutWindow, WindowEvent, cut_recording
-from texture_recordings.bags import is_bag, short_name, topics_in
+from texture_recordings.bags import BagPaths, is_bag, short_name, topics_in
+from texture_recordings.mapping import CONDITION_COLUMNS, SlideBorders, plausible
 from texture_recordings.slides import (
     STREAMS,
     LabelledSlide,
@@ -93,14 +95,14 @@ class SlideDataset:
 
     @classmethod
     def from_bags(
-        cls, bags: Iterable[str | Path], slides: str = '', namespace: str | None = None, topics: Sequence[str] = STREAMS
+        cls, bags: BagPaths, slides: str = '', namespace: str | None = None, topics: Sequence[str] = STREAMS
     ) -> SlideDataset:
         """Read the labelled slides of bags with their signals; see `find_slides` for the arguments and errors.
 
         Parameters
         ----------
         bags
-            Bags, or folders of bags.
+            A bag, or a folder of bags; or several.
         slides
             Slides of each surface to keep, such as '1-30'; '' keeps all.
         namespace
@@ -141,7 +143,7 @@ class SlideDataset:
         rates_hz
             Sampling rate of each topic, Hz.
         speed_m_s, force_n, direction_rad
-            Conditions of all slides, or of each, (n_slides,).
+            Conditions of all slides, or of each, (n_slides,); NaN if unknown.
         channels
             Names of the channels of each topic; 'c0', 'c1', … if not given.
         motion, sensor, session
@@ -155,52 +157,58 @@ class SlideDataset:
         Raises
         ------
         InvalidData
-            If the numbers of slides or channels contradict each other.
+            If the numbers of slides or channels contradict each other, or an array, a label or a condition is none
+            that an import takes.
         """
-        count = len(labels)
+        surfaces = [checked_label(str(label)) for label in ([labels] if isinstance(labels, str) else labels)]
+        if not all(surfaces):
+            raise InvalidData(f'slide {surfaces.index("") + 1} has an empty label; give the surface of each')
+        count = len(surfaces)
         for topic, arrays in signals.items():
-            if len(arrays) != count or topic not in rates_hz:
+            if len(arrays) != count or not isinstance(rates_hz, Mapping) or topic not in rates_hz:
                 raise InvalidData(
-                    f"'{topic}' has {len(arrays)} slides and the rate {rates_hz.get(topic)} for {count} labels; "
-                    'give one array (n_samples, n_channels) for each label, and the rate of each topic in Hz'
+                    f"'{topic}' has {len(arrays)} slides for {count} labels, and the rates are {rates_hz}; give one "
+                    "array (n_samples, n_channels) for each label, and the rate of each topic, such as {'signal': 2e3}"
                 )
         if not signals:
             raise InvalidData("no signal was given; give arrays by topic, such as {'signal': [...]}")
         numbers: dict[str, Array] = {}
-        for name, values in (('speed_m_s', speed_m_s), ('force_n', force_n), ('direction_rad', direction_rad)):
+        for (name, column), values in zip(CONDITION_COLUMNS.items(), (speed_m_s, force_n, direction_rad), strict=True):
             array = np.asarray(values, dtype=np.float64)
             if array.shape not in ((), (count,)):
                 raise InvalidData(
-                    f'{name} has the shape {array.shape}; give one number, or one for each of {count} slides'
+                    f'{column} has the shape {array.shape}; give one number, or one for each of {count} slides'
                 )
-            numbers[name] = np.broadcast_to(array, (count,))
+            numbers[column] = np.broadcast_to(array, (count,))
+            for value in array[~np.isnan(array)].tolist():
+                plausible(name, value)
         slides, start_ns = [], 0
-        for index, label in enumerate(labels):
-            batches = {
-                topic: _batch(arrays[index], (sensor or topic, (channels or {}).get(topic), rates_hz[topic]), start_ns)
-                for topic, arrays in signals.items()
-            }
-            duration_ns = max(batch.end_ns for batch in batches.values()) - start_ns
+        for index, surface in enumerate(surfaces):
+            batches = {}
+            for topic, arrays in signals.items():
+                samples = _samples_of(arrays[index], rates_hz[topic], f"'{topic}' of slide {index + 1}")
+                names = (channels or {}).get(topic) or [f'c{number}' for number in range(samples.shape[1])]
+                batches[topic] = TactileSignal(start_ns, sensor or topic, tuple(names), (), rates_hz[topic], 0, samples)
+            end_ns = max(batch.end_ns for batch in batches.values())
+            known: dict[str, Any] = {column: float(values[index]) for column, values in numbers.items()}
             state = ExplorationState(
                 start_ns,
                 f'{session or "array"}/{index}',
                 motion,
                 Phase.SLIDE,
-                duration_ns / NANOSECONDS,
-                float(numbers['speed_m_s'][index]),
-                float(numbers['force_n'][index]),
-                float(numbers['direction_rad'][index]),
-                surface=str(label),
+                (end_ns - start_ns) / NANOSECONDS,
+                surface=surface,
+                **known,
             )
             slides.append(
                 LabelledSlide(
-                    Path(session), state.exploration_id, str(label), 0, start_ns, None,
+                    Path(session), state.exploration_id, surface, 0, start_ns, None,
                     motion=motion_made([state]),
                     signals={topic: (batch,) for topic, batch in batches.items()},
                     states=(state,),
                 )
             )  # fmt: skip
-            start_ns = max(batch.end_ns for batch in batches.values()) + GAP_NS
+            start_ns = end_ns + GAP_NS
         return cls(tuple(number_slides(slides)))
 
     def __len__(self) -> int:
@@ -583,9 +591,17 @@ def _grouped(values: Array, *, circular: bool) -> Array:
     return result
 
 
-def _batch(array: AnyArray, template: tuple[str, Sequence[str] | None, float], start_ns: int) -> TactileSignal:
-    """Return the samples of a slide as a batch; `template` is the sensor, the names of the channels and the rate."""
-    sensor, channels, rate_hz = template
-    samples = np.atleast_2d(np.asarray(array, dtype=np.float32).T).T  # one channel may be given without its axis
-    names = tuple(channels) if channels else tuple(f'c{number}' for number in range(samples.shape[1]))
-    return TactileSignal(start_ns, sensor, names, (), rate_hz, 0, samples)
+def _samples_of(array: AnyArray, rate_hz: float, where: str) -> NDArray[np.float32]:
+    """Return the samples of a slide, (n_samples, n_channels); InvalidData if they are none, or lie on their side."""
+    given = np.asarray(array)
+    samples = given[:, None] if given.ndim == 1 else given  # one channel may be given without its axis
+    finite = 0
+    if samples.ndim == 2 and samples.dtype.kind in 'biuf':
+        finite = int(np.isfinite(samples).all(axis=1).sum())
+    # Fewer samples than channels, and than the shortest slide that an import keeps.
+    if finite < 2 or len(samples) < min(samples.shape[1], SlideBorders.min_s * rate_hz):
+        raise InvalidData(
+            f'{where} has the shape {given.shape} of {given.dtype} with {finite} finite samples; real numbers '
+            '(n_samples, n_channels) are needed: transpose an array on its side, leave out a slide without any'
+        )
+    return samples.astype(np.float32)

@@ -14,6 +14,7 @@ import numpy as np
 from texture_core.config import library, writing, yaml_text
 from texture_core.errors import InvalidData, InvalidParameter, counted
 from texture_core.types import AnyArray
+from texture_recordings.bags import new_folder
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.mapping import CONDITION_COLUMNS, UNITS
 from texture_recordings.slides import STREAMS, SlideSamples
@@ -24,8 +25,6 @@ FACTS = ('slide', 'surface', 'number', 'session', *CONDITION_COLUMNS.values(), '
 def export_slides(dataset: SlideDataset, out: str | Path) -> list[str]:
     """Write every stream of the slides of a data set into a new folder; those that lost samples are counted."""
     folder = Path(out)
-    if folder.exists():
-        raise InvalidParameter(f"'{out}' exists already; nothing is overwritten, name another folder or remove it")
     streams: dict[str, list[SlideSamples]] = {}
     lines, reason = [], 'they have no stream'
     for topic in STREAMS:
@@ -38,8 +37,7 @@ def export_slides(dataset: SlideDataset, out: str | Path) -> list[str]:
         lines += [f"{lost} slides lost samples of '{topic}' and were left out of it"] * bool(lost)
     if not any(streams.values()):
         raise InvalidData(f'none of the {len(dataset)} slides can be exported: {reason}')
-    with writing(folder, 'folder'):
-        folder.mkdir(parents=True)
+    with new_folder(folder):
         for topic, samples in streams.items():
             write_parquet(samples, folder / f'{topic}.parquet')
             (folder / f'{topic}.yaml').write_text(yaml_text(_mapping(topic, samples)), encoding='utf-8')

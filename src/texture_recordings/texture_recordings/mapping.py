@@ -177,6 +177,26 @@ CONDITION_UNITS: Mapping[str, Mapping[str, float]] = {
     'force': {'N': 1.0, 'mN': 1e-3, 'gf': 9.80665e-3, 'kgf': 9.80665},
     'direction': {'rad': 1.0, 'deg': 0.017453292519943295},
 }
+# Lowest and highest mean of a slide that a tactile finger reaches, in SI units.
+PLAUSIBLE: Mapping[str, tuple[float, float, str]] = {
+    'speed': (5e-5, 2.0, '0.05 mm/s to 2 m/s'), 'force': (1e-3, 100.0, '1 mN to 100 N'),
+    'direction': (-6.3, 6.3, '-6.3 to 6.3 rad'),
+}  # fmt: skip
+
+
+def plausible(name: str, value: float, unit: str = '') -> float:
+    """Return the mean of a condition over a slide, given in a unit; InvalidData if no finger reaches it."""
+    low, high, shown = PLAUSIBLE[name]
+    if low <= value <= high:
+        return value
+    units = CONDITION_UNITS[name]
+    unit = unit or next(iter(units))
+    number = value / units[unit]
+    likely = [one for one, factor in units.items() if low <= number * factor <= high]
+    raise InvalidData(
+        f'the {name} of a slide is {number:.4g} {unit}, plausible are {shown}; leave out what is unknown, or look at '
+        'its unit' + (f', which may be {" or ".join(likely)}' if likely else '')
+    )
 
 
 @dataclass(frozen=True)

@@ -35,6 +35,7 @@ RANGE = re.compile(r'(\D*)(\d{1,9})-(?:\1)?(\d{1,9})')
 MAX_RANGE = 10_000
 TRIAL = 'trial'  # number of the first axis of arrays (n_trials, n_samples, n_channels)
 MAX_ARRAYS = 50_000  # data sets of an HDF5 file
+MOST_COLUMNS = 10  # that a message names
 MAX_CHANNELS = 10_000  # more are samples: the array lies on its side
 MAX_TEXT_BYTES = 64 * MB  # read at once from an HDF5 file
 MAX_TEXT = 200  # characters of a cell that is shown or a label
@@ -59,7 +60,10 @@ class TableFrame:
     def __getitem__(self, name: str) -> AnyArray:
         """Return a column; UnknownName with the nearest if there is none."""
         if name not in self.columns:
-            raise unknown_name(name, self.columns, 'column')
+            error = unknown_name(name, self.columns, 'column', MOST_COLUMNS)
+            by_row = 'arrays (n_windows, n_samples, n_channels) have it; of (n_windows, n_samples) write slides: '
+            hint = f'; {by_row}{{by: row}} and `samples_per_row`' if name == TRIAL else ''
+            raise UnknownName(f'{error}{hint}')
         return self.columns[name]
 
     def numbers(self, name: str) -> Array:
@@ -98,7 +102,7 @@ def chosen(wanted: Sequence[str], names: Sequence[str], other: Mapping[str, str]
         elif name not in names and len(name) <= 100:
             meant = [one for one in names if one and one not in other and fnmatch.fnmatchcase(one, name)] or [name]
         if unknown := [one for one in meant if one not in names]:
-            raise unknown_name(unknown[0], names, 'column')
+            raise unknown_name(unknown[0], names, 'column', MOST_COLUMNS)
         if twice := [one for one in meant if other.get(one, 'conditions') != 'conditions']:
             raise InvalidData(
                 f"column '{twice[0]}' is a channel under `columns` and is the column under `{other[twice[0]]}`; remove "
@@ -164,6 +168,7 @@ NO_TEXT = frozenset(('nan', 'na', 'n/a', '#n/a', 'null'))  # 'none' may be a lab
 BLANK = frozenset(('', 'nan', 'na', 'null', 'none'))
 NO_WORD = NO_TEXT | BLANK | {'inf', '-inf', '+inf'}
 WORD = re.compile(r'[^\W\d_]')
+DATE = re.compile(r'\d{1,4}([-/.])\d\d?\1\d{1,4}|\d\d?:\d\d')  # or a time of the day
 THOUSANDS = {sign: re.compile(rf'[+-]?[1-9]\d{{0,2}}({re.escape(sign)}\d{{3}})+') for sign in '.,'}
 FEW_THOUSANDS = 3  # cells with a point: fewer may be decimals by chance
 NUMERIC = 0.9  # share of numbers in a column of numbers
@@ -303,7 +308,9 @@ def _names(cells: Sequence[str], form: FileFormat, line: int) -> list[str]:
 
 def _reason(name: str, cell: str, form: FileFormat) -> str:
     hint = ''
-    if form.decimal == ',' and math.isfinite(number_of(cell)):
+    if DATE.match(cell):
+        hint = '; dates are not read: write seconds, as t - t[0], or give `rate_hz` in place of `time`'
+    elif form.decimal == ',' and math.isfinite(number_of(cell)):
         hint = '; if points are decimal, leave out `decimal` under `format`'
     elif math.isfinite(number_of(cell.replace(',', '.'))):
         hint = "; if commas are decimal, write format: {decimal: ','}"

@@ -32,7 +32,7 @@ from texture_core.types import (
     TactileSignal,
     join_batches,
 )
-from texture_recordings.bags import EXPLORATION, find_bags, read_bag
+from texture_recordings.bags import EXPLORATION, BagPaths, find_bags, read_bag
 
 # --------------------
 # One labelled slide in a bag.
@@ -246,7 +246,7 @@ def parse_selection(text: str) -> frozenset[int] | None:
 
 
 def find_slides(
-    bags: Iterable[str | Path], slides: str = '', namespace: str | None = None, topics: Sequence[str] = ()
+    bags: BagPaths, slides: str = '', namespace: str | None = None, topics: Sequence[str] = ()
 ) -> list[LabelledSlide]:
     """Return the labelled slides in bags, by bag and time, with the signals of topics; each bag is read once.
 

@@ -31,6 +31,7 @@ from texture_recordings.mapping import (
     Quantity,
     StreamColumns,
     TableMapping,
+    plausible,
     template_fields,
 )
 from texture_recordings.readers import (
@@ -70,11 +71,6 @@ CODE_NAME = re.compile(
     r'(?:sensor|finger|trial|run|rep|repeat|repetition|recording|session|pass|stroke)s?[ _-]?(?:id|no|nr|number)?'
 )
 MAX_TURNS, IN_TURN = 100, 0.7  # sensors in turn, and share of rows with the number of as many rows before
-# Lowest and highest mean of a slide that a tactile finger reaches, in SI units.
-PLAUSIBLE: Mapping[str, tuple[float, float, str]] = {
-    'speed': (5e-5, 2.0, '0.05 mm/s to 2 m/s'), 'force': (1e-3, 100.0, '1 mN to 100 N'),
-    'direction': (-6.3, 6.3, '-6.3 to 6.3 rad'),
-}  # fmt: skip
 
 
 @dataclass
@@ -633,8 +629,8 @@ class FrameSlides:
         for name, column in CONDITION_COLUMNS.items():
             mean = self._condition(name, rows)
             if math.isfinite(mean):
-                self._report.conditions[surface, name].append(self._plausible(name, mean))
-                known[column] = mean
+                known[column] = plausible(name, mean, self._mapping.conditions[name].unit)
+                self._report.conditions[surface, name].append(mean)
             elif name in self._mapping.conditions:
                 self._report.kept[f'slides without {name}'] += 1
         lasts_s, speed_m_s = end_s - begin_s, known.get('speed_m_s', 0.0)
@@ -727,20 +723,6 @@ class FrameSlides:
                 )
 
     # ---- conditions
-
-    def _plausible(self, name: str, value: float) -> float:
-        """Return the mean of a condition over a slide; InvalidData if no finger reaches it."""
-        low, high, shown = PLAUSIBLE[name]
-        if low <= value <= high:
-            return value
-        units = CONDITION_UNITS[name]
-        given = self._mapping.conditions[name].unit or next(iter(units))
-        number = value / units[given]
-        likely = [unit for unit, factor in units.items() if low <= number * factor <= high]
-        raise InvalidData(
-            f'the {name} of a slide is {number:.4g} {given}, plausible are {shown}; leave out what is unknown, or '
-            'look at its unit in the mapping' + (f', which may be {" or ".join(likely)}' if likely else '')
-        )
 
     def _condition(self, name: str, rows: slice) -> float:
         """Return the mean of a condition over a slide in SI units, NaN if unknown; a force and a speed without sign."""

@@ -117,7 +117,7 @@ def _info(options: argparse.Namespace) -> int:
     path = Path(options.path)
     # A model is one of two files with the same name; everything else is read as a bag, whose errors are reported.
     endings = ('.npz', '.json')
-    half = any(path.with_name(f'{path.name}{ending}').is_file() for ending in endings)
+    half = any(Path(f'{path}{ending}').is_file() for ending in endings)
     if not path.is_dir() and (half or path.suffix in endings):
         print('\n'.join(_model_lines(path)))
         return 0

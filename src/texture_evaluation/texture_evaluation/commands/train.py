@@ -59,7 +59,9 @@ def run(options: argparse.Namespace) -> int:
 
 def _check_place(out: Path, *, replace: bool) -> None:
     """Refuse, before anything is computed, a place where a model is already, or a folder that does not exist."""
-    file = out.with_name(f'{out.name.removesuffix(".npz")}.npz')
+    from texture_estimation.model import both_files
+
+    file, _ = both_files(out)
     if file.exists() and not replace:
         raise InvalidParameter(f"'{file}' exists; give another name, or --force to replace it")
     added = file.with_suffix('.added')
@@ -141,4 +143,6 @@ def graded_summary(model: RoughnessModel, out: Path) -> list[str]:
 
 
 def _saved_as(out: Path) -> str:
-    return f'saved as {out.with_name(out.name.removesuffix(".npz"))}.npz, with its model card next to it'
+    from texture_estimation.model import both_files
+
+    return f'saved as {both_files(out)[0]}, with its model card next to it'

@@ -69,7 +69,7 @@ def _import_mapped(options: argparse.Namespace) -> list[Path]:
 def _configure_segment(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('bags', nargs='+', help='bags, or folders of bags')
     parser.add_argument('--out', required=True, metavar='DIR', help='folder for the copies with the states found')
-    parser.add_argument('--surface', default='', metavar='NAME', help='label of all slides; default: as in the bag')
+    parser.add_argument('--surface', required=True, metavar='NAME', help='label of all slides')
     add_bag_namespace(parser)
     add_parameters(parser, SegmentationParams)
 

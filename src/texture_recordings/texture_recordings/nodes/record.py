@@ -12,12 +12,13 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
+import rclpy
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from texture_core.config import param
-from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.errors import InvalidData, InvalidParameter, TextureError
 from texture_core.ros import DiagnosticReport, Diagnostics, declare, run
 from texture_core.types import ENDED, Quality, TactileSignal
 from texture_recordings.bags import COMMON, MESSAGES, BagWriter, Continuity, RawMessage, decode, typestore
@@ -61,7 +62,7 @@ class RecordNode(Node):
         self._continuity = Continuity()
         self._exploring: dict[str, str] = {}  # id of the exploration that is recorded, '' if none, by topic
         self._queue: queue.Queue[RawMessage | None] = queue.Queue(QUEUE)
-        self._error: OSError | None = None
+        self.error: TextureError | None = None  # which ended the recording
         self._writer = threading.Thread(target=self._write, name='writer')
         self._writer.start()
         self._namespace = self.get_namespace().rstrip('/')
@@ -81,8 +82,10 @@ class RecordNode(Node):
         self._writer.join()
         try:
             self._bag.close()
-        except OSError as error:
-            self.get_logger().error(f"'{self._path}' cannot be completed: {error}; free some space and record again")
+        except TextureError as error:
+            self.error = error
+        if self.error is not None:
+            self.get_logger().error(f'the bag is not complete: {self.error}')
         else:
             self.get_logger().info(f"'{self._path}' is complete: {self._report()[1]}")
             self._diagnostics.end()
@@ -137,8 +140,8 @@ class RecordNode(Node):
                 if time.monotonic() - flushed_s >= FLUSH_S:
                     flushed_s = time.monotonic()
                     self._bag.flush()
-            except OSError as error:  # noqa: PERF203 - what comes later may fit
-                self._error = self._error or error
+            except TextureError as error:  # noqa: PERF203 - what comes later may fit
+                self.error = self.error or error
 
     def _note(self, message: RawMessage) -> None:
         """Count lost samples, and bring an exploration that is over to the disk."""
@@ -159,8 +162,9 @@ class RecordNode(Node):
             self.get_logger().info(f"exploration '{before}' is on the disk: {self._report()[1]}")
 
     def _check(self) -> None:
-        if self._error is not None:
-            raise InvalidData(f"'{self._path}' cannot be written: {self._error}; free some space and record again")
+        """End the node when the bag cannot be written."""
+        if self.error is not None:
+            rclpy.try_shutdown()
 
     def _report(self) -> DiagnosticReport:
         lost = sum(self._continuity.lost.values())
