@@ -116,6 +116,15 @@ def test_slides_that_are_all_right_or_all_wrong_have_the_exact_bound(n: int) -> 
     assert interval(wrong) == [0.0, pytest.approx(1.0 - edge)]
 
 
+def test_clusters_that_are_alike_or_one_wrong_window_narrow_no_interval() -> None:
+    alike = np.array([[2.0, 3.0]] * 3 + [[0.0, 0.0]])  # a cluster without answers is none
+    edge = 0.05 ** (1 / 3)
+    assert interval(alike) == pytest.approx([2.0 / 3.0 * edge, 1.0 - edge / 3.0])
+    windows = np.full((20, 2), 156.0)
+    windows[0, 0] -= 1.0
+    assert interval(windows) == [pytest.approx(3119 / 3120 * 0.05 ** (1 / 20)), 1.0]
+
+
 def test_shuffled_labels_are_recognised_by_chance_alone() -> None:
     figures = cross_validate(RECIPE, tones(15, shuffled=True), StratifiedGroupKFold(5)).as_json()
     # 60 slides of four labels: 25 % by chance, and 3 standard deviations of a binomial fraction are 17 %.

@@ -96,7 +96,7 @@ def _check_cluster(client: Any, address: str) -> None:
 
 
 # --------------------
-# Accuracy of windows and slides, with 95 % intervals by bootstrap over clusters; exact at 0 and 100 %.
+# Accuracy of windows and slides, with 95 % intervals by bootstrap over clusters, widened by what none of them shows.
 
 RESAMPLES, CONFIDENCE = 2000, 0.95  # of the bootstrap
 
@@ -146,15 +146,16 @@ def _accuracy_of(counts: Array, clusters: AnyArray) -> tuple[float | None, list[
 def interval(counts: Array, clusters: Sequence[str] | AnyArray | None = None) -> list[float]:
     """Return the 95 % interval of an accuracy by bootstrap over clusters: answers within one are not independent.
 
-    Where all answers or none are right, every resample is the same: the interval is then the exact one-sided bound on
-    the fraction of clusters, about 3/n wide.
+    A kind of cluster that none of n has shown may still be up to 1 - 0.05^(1/n) of all, and be all right or all wrong:
+    that widens the interval. Source of this bound, which is exact where all answers or none are right: Clopper &
+    Pearson 1934.
     """
     counts = counts if clusters is None else clustered(counts, clusters)
+    counts = counts[counts[:, 1] > 0]
     right, answers = counts.sum(axis=0)
-    if right in (0.0, answers):
-        edge = float((1.0 - CONFIDENCE) ** (1.0 / np.count_nonzero(counts[:, 1])))
-        return [edge, 1.0] if right else [0.0, 1.0 - edge]
-    return _edges(_resampled(counts))
+    shown = float((1.0 - CONFIDENCE) ** (1.0 / len(counts)))  # the least fraction of clusters of a kind that was shown
+    low, high = _edges(_resampled(counts))
+    return [min(low, float(right / answers) * shown), max(high, 1.0 - (1.0 - float(right / answers)) * shown)]
 
 
 def clustered(counts: Array, clusters: Sequence[str] | AnyArray) -> Array:
