@@ -63,7 +63,7 @@ def train_from_bags(
         'sessions': sorted({slide.session for slide in dataset}),
         'slide_digests': sorted(map(slide_digest, dataset)),
         'samples': most,
-        'unusable': unusable(dataset, examples),
+        'unusable': not_counted(unusable(dataset, examples)),
     }
     model = replace(model, training={**model.training, **trained_on, **({'tare': faults} if faults else {})})
     if out is not None:
@@ -87,7 +87,7 @@ def train_grades_from_bags(
     examples = dataset.features(windows)
     with task(f"fitting '{plan.name}' to {len(examples.y)} windows"):
         model = train_grades(plan, examples, table, _name(out, plan.name))
-    model = replace(model, training={**model.training, 'unusable': unusable(dataset, examples)})
+    model = replace(model, training={**model.training, 'unusable': not_counted(unusable(dataset, examples))})
     if out is not None:
         _save(model, out, bags, slides, grades=str(grades))
     return model

@@ -240,8 +240,9 @@ def check_finite(examples: LabelledFeatures) -> None:
             f'needs; record or import them with it (`conditions: {needed}` in a mapping), or take another recipe'
         )
     raise InvalidData(
-        f'{windows.sum()} of {len(examples.labels)} windows have no finite value of {counted(int(bad.sum()), "feature")}, the '
-        f"first '{name}'; leave these features out of the recipe, or these windows out of the examples"
+        f'{windows.sum()} of {len(examples.labels)} windows have no finite value of '
+        f"{counted(int(bad.sum()), 'feature')}, the first '{name}'; leave these features out of the recipe, or these "
+        'windows out of the examples'
     )
 
 

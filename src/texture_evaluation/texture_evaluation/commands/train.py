@@ -74,7 +74,6 @@ def _check_place(out: Path, *, replace: bool) -> None:
 def summary(model: TextureModel, out: Path) -> list[str]:
     """Return the labels of a model and its held-out accuracy, in lines."""
     from texture_estimation.acceptance import LEAST_SLIDES_A_LABEL
-    from texture_evaluation.train import not_counted
 
     training = model.training
     accuracy, slides = training['held_out_window_accuracy'], model.acceptance.domain.slides
@@ -91,7 +90,7 @@ def summary(model: TextureModel, out: Path) -> list[str]:
         f'from {training["slides"]} slides, {training["windows"]} windows of {training["window_s"]:g} s; {held_out}',
         *_unfit(model, None if few else accuracy),
         *_uneven(slides),
-        *not_counted(training.get('unusable', [])),
+        *training.get('unusable', []),
         *training.get('tare', []),
         *filter(
             None, [model.acceptance.reason or model.acceptance.decided_reason, model.acceptance.domain.reach_reason]
@@ -132,15 +131,13 @@ def _uneven(slides: Mapping[str, int]) -> list[str]:
 
 def graded_summary(model: RoughnessModel, out: Path) -> list[str]:
     """Return the training set and the held-out errors of a roughness model, in lines."""
-    from texture_evaluation.train import not_counted
-
     training = model.training
     error = training.get('held_out_error')
     held_out = 'nothing was held out' if error is None else f'{error:.2f} grades mean error on held-out textures'
     return [
         f"recipe '{model.recipe.name}' trained on the grades of {training['textures']} textures",
         f'from {training["slides"]} slides, {training["windows"]} windows of {training["window_s"]:g} s; {held_out}',
-        *not_counted(training.get('unusable', [])),
+        *training.get('unusable', []),
         _saved_as(out),
     ]
 
