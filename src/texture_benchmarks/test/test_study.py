@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
-from texture_benchmarks.study import BenchmarkOptions, accuracy_interval, map_forked, recorded, resumed
+from texture_benchmarks.study import BenchmarkOptions, fraction_interval, map_forked, recorded, resumed
 from texture_core.errors import InvalidData
 
 
@@ -60,7 +60,7 @@ def test_linear_algebra_keeps_to_one_thread_in_each() -> None:
     assert map_forked(threads, [0]) == [{1}]
 
 
-def test_an_interval_is_as_wide_as_slides_and_surfaces_ask_for() -> None:
-    assert accuracy_interval([True] * 20, ['a', 'b'] * 10) == pytest.approx((0.8316, 1.0), abs=1e-4)  # 1 - 0.025^(1/20)
-    low, high = accuracy_interval([True] * 10 + [False] * 10, ['a'] * 10 + ['b'] * 10)
-    assert (low, high) == (0.0, 1.0)  # one surface is right and one is wrong: any fraction is possible
+def test_an_interval_is_as_wide_as_surfaces_ask_for() -> None:
+    assert fraction_interval([True] * 20, ['a', 'b'] * 10) == pytest.approx([0.05**0.5, 1.0])
+    # One surface is right and one is wrong: any fraction is possible.
+    assert fraction_interval([True] * 10 + [False] * 10, ['a'] * 10 + ['b'] * 10) == [0.0, 1.0]

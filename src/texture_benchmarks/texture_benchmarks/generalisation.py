@@ -117,8 +117,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
 
     Accuracy at the end of a slide, slides accepted and correct, and accepted but wrong; the largest fraction accepted
     but wrong at 0.5, 1 and 2.5 s, once decided, and at the end. Peers have no rejection: each label of theirs counts
-    as accepted. 95 % intervals by bootstrap over surface × part, date or run: slides over one track are no independent
-    draws.
+    as accepted. 95 % intervals over surface × part, date or run: slides over one track are no independent draws.
     """
     chosen = {QUICK_SET: SETS[QUICK_SET]} if options.quick else SETS
     public = [name for name in chosen if not name.startswith('simulated')]

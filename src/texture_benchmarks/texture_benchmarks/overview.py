@@ -24,7 +24,7 @@ from texture_benchmarks.study import (
     QUICK_SLIDES,
     BenchmarkOptions,
     BenchmarkResult,
-    accuracy_interval,
+    fraction_interval,
     map_forked,
     recorded,
     with_spaced_windows,
@@ -89,9 +89,9 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
 
     Recipes as released, those of papers with one set of variables each, their training windows at least 0.5 s
     apart; peers with windows of 0.5 s that do not overlap. Accuracy of slides over the sliding time, with 95 %
-    intervals by bootstrap over surfaces, or exact over slides where these are wider; mean sliding time and accuracy
-    when each slide ends as soon as it is decided; computing time of one window from samples to estimate (µs, median
-    and 99th percentile), by the clock of the processor, of the round of 5 over all methods whose median was lowest.
+    intervals over surfaces; mean sliding time and accuracy when each slide ends as soon as it is decided; computing
+    time of one window from samples to estimate (µs, median and 99th percentile), by the clock of the processor, of
+    the round of 5 over all methods whose median was lowest.
     """
     dataset = recorded(options, 'biotac20', (QUICK_SLIDES, QUICK_MATERIALS))
     splitter = ChronologicalSplit(4 / 6 if options.quick else 30 / 40)  # of the slides of each material
@@ -186,7 +186,7 @@ def _time_peer(classifier: Any, windows: AnyArray) -> Array:
 
 def _over_time(right: Mapping[float, Sequence[bool]], surfaces: Sequence[str]) -> dict[str, Any]:
     """Return the accuracy of slides after each time, with intervals over the surfaces."""
-    intervals = {seconds: accuracy_interval(each, surfaces) for seconds, each in right.items()}
+    intervals = {seconds: fraction_interval(each, surfaces) for seconds, each in right.items()}
     accuracy = {seconds: float(np.mean(each)) for seconds, each in right.items()}
     usual = (*metrics.TIMES_S, AT_S)
     return {

@@ -43,7 +43,7 @@ def recipe_of(name: str) -> Recipe:
 def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Train recipes of the papers on slides over one half of a track, and test other slides over both halves.
 
-    Fraction of the slides that are right at their end. Intervals of 95 % by bootstrap over material × half.
+    Fraction of the slides that are right at their end. Intervals of 95 % over material × half.
     """
     # Read the slides, and train and test every recipe at the halves of the track.
     whole = recorded(options, 'biotac20', ('1-12', QUICK_MATERIALS))

@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from scipy.stats import binomtest
 
 from texture_core.errors import DeviceError, InvalidData
 from texture_core.types import AnyArray
@@ -150,20 +149,8 @@ def _do(job: Any) -> Any:
 
 
 def fraction_interval(which: AnyArray | Sequence[bool], clusters: Sequence[str]) -> list[float]:
-    """Return the 95 % interval of a fraction, by bootstrap over clusters: slides of one are no independent draws."""
+    """Return the 95 % interval of a fraction, over clusters: slides of one are no independent draws."""
     return interval(np.stack([which, np.ones(len(which))], axis=1), clusters)
-
-
-def accuracy_interval(right: Sequence[bool], surfaces: Sequence[str]) -> tuple[float, float]:
-    """Return the 95 % interval of a fraction of slides: by bootstrap over surfaces, or exact over slides where wider.
-
-    Where all surfaces are alike, resampling them shows nothing. Source of the exact one: Clopper & Pearson 1934.
-    """
-    drawn = fraction_interval(right, surfaces)
-    exact = binomtest(int(np.sum(right)), len(right)).proportion_ci()
-    if all(right) or not any(right):
-        return float(exact.low), float(exact.high)
-    return float(min(drawn[0], exact.low)), float(max(drawn[1], exact.high))
 
 
 def recorded(

@@ -18,7 +18,7 @@ from texture_benchmarks.study import (
     QUICK_MATERIALS,
     BenchmarkOptions,
     BenchmarkResult,
-    accuracy_interval,
+    fraction_interval,
     recorded,
     with_spaced_windows,
 )
@@ -156,7 +156,7 @@ def outcome(results: Sequence[SlideResult]) -> dict[str, Any]:
         'accepted_correct': sum(final),
         'accepted_wrong': len(final) - sum(final),
         'correct': sum(labels),
-        'interval': accuracy_interval(labels, [one.surface for one in results]),
+        'interval': fraction_interval(labels, [one.surface for one in results]),
     }
 
 
@@ -168,8 +168,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
 
     Slides that are accepted and correct, rejected, or accepted but wrong, at the first decided estimate and at the
     end, and slides whose label is correct, accepted or not. Unknown: slides over materials that were not trained,
-    accepted all the same. The estimates have no information of the disturbance. 95 % intervals by bootstrap over
-    surfaces, or exact over slides where these are wider.
+    accepted all the same. The estimates have no information of the disturbance. 95 % intervals over surfaces.
     """
     rows, compared = (QUICK_ROWS, QUICK_COMPARED) if options.quick else (tuple(ROWS), COMPARED)
     slides = recorded(options, 'biotac20', ('1-15', QUICK_MATERIALS))

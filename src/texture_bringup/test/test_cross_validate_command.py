@@ -34,8 +34,9 @@ def test_a_recipe_is_cross_validated_from_the_command_line(bags: Path, tmp_path:
     assert lines[0] == "recipe 'peaks-naive-bayes', split stratified:2: 2 surfaces; same bag; place not compared"
     assert [line.split()[0] for line in lines[2:5]] == ['1', '2', 'all']
     written = json.loads(figures.read_text())
-    assert written['n_slides'] == 8
-    assert {name for fold in written['folds'] for name in fold['slides']} == {
+    [recipe] = written['recipes']
+    assert (recipe['n_slides'], written['comparisons']) == (8, [])
+    assert {name for fold in recipe['folds'] for name in fold['slides']} == {
         f'{surface}/{number}' for surface in SURFACES for number in range(1, 5)
     }
 

@@ -52,7 +52,7 @@ def test_examples_unfit_for_training_get_a_sentence(examples):
         train(RECIPE, examples.take(examples.labels == 'cork'))
     values = examples.values.copy()
     values[3, 1] = np.nan
-    with pytest.raises(InvalidData, match="'signal/f1' and 0 others are not finite in 1 of 384"):
+    with pytest.raises(InvalidData, match="1 of 384 windows have no finite value of 1 feature, the first 'signal/f1'"):
         train(RECIPE, dataclasses.replace(examples, values=values))
     with pytest.raises(InvalidData, match='shape'):
         dataclasses.replace(examples, names=('a',))

@@ -21,7 +21,7 @@ from texture_core.config import MB, find_file, from_mapping, param, read_text, u
 from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.types import NANOSECONDS, Array, FeatureVector, RoughnessEstimate
 from texture_estimation.evidence import no_window
-from texture_estimation.learners.learner import Codes, standardisation
+from texture_estimation.learners.learner import Codes, check_finite, standardisation
 from texture_estimation.model import StoredModel, common_parts, model_stem, part_of, read_tree, usable
 from texture_estimation.recipe import TrainingParams, check_keys
 from texture_features.feature_set import FeatureSet, LabelledFeatures, choose, fingerprint_difference, read_recipe
@@ -526,13 +526,7 @@ def train_grades(recipe: RoughnessRecipe, examples: LabelledFeatures, grades: Gr
     labels, codes = np.unique(examples.labels, return_inverse=True)
     table = {str(label): grades.of(str(label)) for label in labels}
     true = np.array([table[str(label)] for label in labels])[codes]
-    bad = ~np.isfinite(examples.values).all(axis=0)
-    if bad.any():
-        name = examples.names[int(bad.argmax())]
-        raise InvalidData(
-            f"feature '{name}' and {int(bad.sum()) - 1} others are not finite; features of the surface need the speed "
-            'of every slide: record it, or leave these features out of the recipe'
-        )
+    check_finite(examples)
     columns = graded_columns(examples.names)
     values = examples.values[:, columns]
     calibration, facts = Calibration(), {'calibration': f'not calibrated: fewer than {MIN_TEXTURES} textures'}

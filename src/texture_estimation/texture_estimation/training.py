@@ -25,6 +25,7 @@ from texture_estimation.learners.learner import (
     Fitted,
     Predictor,
     assign_folds,
+    check_finite,
     extras_of,
     group_means,
     hidden_layer,
@@ -475,11 +476,4 @@ def _check(examples: LabelledFeatures) -> None:
     labels = np.unique(examples.labels)
     if len(labels) < 2:
         raise InvalidData(f"all windows are of '{labels[0]}'; at least two surfaces are needed to distinguish them")
-    bad = ~np.isfinite(examples.values).all(axis=0)
-    if bad.any():
-        name = examples.names[int(bad.argmax())]
-        windows = int((~np.isfinite(examples.values)).any(axis=1).sum())
-        raise InvalidData(
-            f"feature '{name}' and {int(bad.sum()) - 1} others are not finite in {windows} of {len(examples.labels)} "
-            'windows; leave these features out of the recipe, or these windows out of the examples'
-        )
+    check_finite(examples)

@@ -13,7 +13,13 @@ import pytest
 from foreign_tables import MAPPING, recordings, write_csv
 from matplotlib.figure import Figure
 from scipy.stats import beta
-from sklearn.model_selection import GroupShuffleSplit, LeaveOneGroupOut, PredefinedSplit, StratifiedGroupKFold
+from sklearn.model_selection import (
+    GroupShuffleSplit,
+    LeaveOneGroupOut,
+    PredefinedSplit,
+    StratifiedGroupKFold,
+    StratifiedKFold,
+)
 
 from texture_core.config import write_json
 from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch
@@ -116,6 +122,15 @@ def test_slides_that_are_all_right_or_all_wrong_have_the_exact_bound(n: int) -> 
     assert interval(wrong) == [0.0, pytest.approx(1.0 - edge)]
 
 
+def test_clusters_that_are_alike_or_one_wrong_window_narrow_no_interval() -> None:
+    alike = np.array([[2.0, 3.0]] * 3 + [[0.0, 0.0]])  # a cluster without answers is none
+    edge = 0.05 ** (1 / 3)
+    assert interval(alike) == pytest.approx([2.0 / 3.0 * edge, 1.0 - edge / 3.0])
+    windows = np.full((20, 2), 156.0)
+    windows[0, 0] -= 1.0
+    assert interval(windows) == [pytest.approx(3119 / 3120 * 0.05 ** (1 / 20)), 1.0]
+
+
 def test_shuffled_labels_are_recognised_by_chance_alone() -> None:
     figures = cross_validate(RECIPE, tones(15, shuffled=True), StratifiedGroupKFold(5)).as_json()
     # 60 slides of four labels: 25 % by chance, and 3 standard deviations of a binomial fraction are 17 %.
@@ -187,13 +202,26 @@ def test_answers_of_one_cluster_count_together() -> None:
         (
             LeaveOneGroupOut(),
             np.tile(list(TONES_HZ), 6),
-            r'trained are .*; tested are cork; .*set `session`.*stratified',
+            r'trained are .*; tested are cork; use the split stratified$',
         ),
     ],
 )
 def test_impossible_splits_are_refused_with_a_sentence(splitter: object, groups: object, sentence: str) -> None:
     with pytest.raises(InvalidData, match=sentence):
         cross_validate(RECIPE, tones(), splitter, groups=groups)
+
+
+def test_slides_without_force_or_speed_are_told_from_other_values_that_are_not_finite() -> None:
+    signals = {'signal': [np.random.default_rng(0).normal(size=(600, 1)) for _ in range(6)]}
+    for recipe, given, lacking in (('any-place', 'speed_m_s', 'force'), ('any-speed', 'force_n', 'speed')):
+        dataset = SlideDataset.from_arrays(signals, ['cork', 'felt'] * 3, {'signal': 1000.0}, **{given: 0.5})
+        with pytest.raises(InvalidData, match=f'4 of 4 slides came without {lacking}, which .*or take another recipe$'):
+            cross_validate(recipe, dataset, StratifiedGroupKFold(3))
+
+
+@pytest.mark.filterwarnings('error')
+def test_a_splitter_that_knows_no_groups_is_taken_without_a_warning_of_its_library() -> None:
+    assert cross_validate(RECIPE, tones(), StratifiedKFold(3)).as_json()['slide_accuracy'] == 1.0
 
 
 def test_a_surface_of_one_session_trains_but_is_not_tested() -> None:
@@ -270,7 +298,10 @@ def test_of_the_shift_only_what_is_certain_is_claimed(
 
 def test_a_fold_without_two_surfaces_to_train_on_is_named() -> None:
     dataset = tones().select(labels=['cork', 'felt'])
-    only = np.array(['x' if label == 'cork' else 'y' for label in dataset.labels])
+    sessions = SlideDataset(tuple(replace(slide, bag=Path(slide.surface)) for slide in dataset))
+    with pytest.raises(InvalidData, match='tested are cork; if each session holds one surface, set `session`'):
+        cross_validate(RECIPE, sessions, LeaveOneGroupOut(), groups='session')
+    only = np.array(['x' if label == 'cork' or number < 4 else 'y' for number, label in enumerate(dataset.labels)])
     with pytest.raises(InvalidData, match="fold 'x' cannot be trained: all windows are of 'felt'"):
         cross_validate(RECIPE, dataset, LeaveOneGroupOut(), groups=only)
 

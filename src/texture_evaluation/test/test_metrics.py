@@ -41,6 +41,8 @@ def test_accuracy_at_a_time_is_that_of_the_last_decision_by_then(seconds: float,
 def test_a_report_states_when_slides_were_decided_or_that_none_was(decided_from: int, line: str) -> None:
     report = EvaluationReport(('a', 'b'), [slide('a', 'bbaa', decided_from=decided_from)], [], np.ones(4))
     assert line in summary(report)
+    assert any(', once decided: ' in one for one in summary(report)) == bool(report.as_json()['once_decided'])
+    assert bool(report.as_json()['early']) == (decided_from == 2)
 
 
 def test_a_decision_is_early_when_it_is_certain_of_a_known_surface() -> None:
@@ -125,7 +127,7 @@ def test_each_line_names_the_slides_that_it_counts() -> None:
     early = 'with early stopping ended early and accepted 0.0 %'
     ends = f'accepted at the end 0.0 %, {early}; slides rejected at the end: 4 novel'
     assert f'of the 4 slides over other surfaces: {ends}' in lines
-    assert lines[-1].startswith('1 slides are not counted, as each window ')
+    assert lines[-1].startswith('1 slide not counted, as each window ')
     assert lines[-1].endswith(': x/1')
 
 

@@ -84,7 +84,7 @@ def test_slides_are_selected_by_number_label_and_condition() -> None:
 def test_an_unknown_condition_or_one_that_slides_do_not_tell_is_refused() -> None:
     with pytest.raises(InvalidData, match="no condition 'colour'; use one of speed, force"):
         from_arrays().condition('colour')
-    with pytest.raises(InvalidData, match="slide 'cork/1' and 5 others have no force"):
+    with pytest.raises(InvalidData, match="6 of 6 slides have no force, first 'cork/1'"):
         from_arrays(force_n=math.nan).condition('force')
 
 

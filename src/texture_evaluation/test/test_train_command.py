@@ -17,7 +17,7 @@ from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.roughness import load_roughness_model
 from texture_estimation.training import train
 from texture_evaluation.charts import refuse_chart_format
-from texture_evaluation.commands.train import summary
+from texture_evaluation.commands.train import graded_summary, summary
 from texture_evaluation.evaluate import evaluate
 from texture_evaluation.evaluate import summary as report_summary
 from texture_evaluation.train import train_from_bags, train_grades_from_bags, training_examples
@@ -147,6 +147,20 @@ def test_a_stream_that_is_not_tared_as_the_recipe_states_is_reported(tared, faul
     ] * 2
 
 
+def test_training_names_the_slides_that_it_cannot_count_as_evaluation_does(tmp_path, monkeypatch) -> None:
+    samples = [np.random.default_rng(0).normal(size=(length, 1)) for length in [1500] * 7 + [200]]
+    slides = SlideDataset.from_arrays({'signal': samples}, ['cork', 'felt'] * 4, {'signal': 1000.0}, speed_m_s=0.05)
+    monkeypatch.setattr(SlideDataset, 'from_bags', lambda *_, **__: slides)
+    (tmp_path / 'mine.yaml').write_text('{learner: discriminant, inputs: {signal: {features: [mean]}}}')
+    (tmp_path / 'grades.csv').write_text('texture,grade\ncork,1\nfelt,3\n')
+    model = train_from_bags(str(tmp_path / 'mine.yaml'), [tmp_path])
+    graded = train_grades_from_bags('roughness', [tmp_path], tmp_path / 'grades.csv')
+    why = 'as each window lacks samples, has some that are NaN, or is longer than the slide'
+    out = Path('model.npz')
+    for lines in (summary(model, out), graded_summary(graded, out), report_summary(evaluate(model, [tmp_path]))):
+        assert f'1 slide not counted, {why}: felt/4' in lines
+
+
 def test_bags_and_grades_make_a_model_whose_card_lists_them(simulated, tmp_path) -> None:
     (tmp_path / 'grades.csv').write_text('texture,grade\nglass,1\nleather,3\nridge_2mm_deep,5\n')
     train_grades_from_bags('roughness', [simulated], tmp_path / 'grades.csv', '1-4', tmp_path / 'rough.npz')
@@ -202,11 +216,9 @@ def test_distinct_surfaces_are_recognised_and_the_figures_agree_with_each_other(
     assert figures['window_accuracy'] == pytest.approx(np.trace(table) / table.sum())
     assert figures['window_accuracy'] > 0.9
     assert figures['accuracy_at_s'] == {'0.5': pytest.approx(1.0), '1.0': 1.0, '2.5': None, '5.0': None}
-    assert figures['early']['accuracy'] == 1.0
-    assert 0.5 <= figures['early']['mean_s'] <= 1.2
     assert figures['unknown_accepted'] is None
-    assert figures['once_decided'] == {'accepted_wrong': 0.0, 'rejected': 1.0}
     assert (figures['accepted_wrong'], figures['rejected']) == (0.0, 1.0)  # four slides a surface are too few
+    assert (figures['early'], figures['once_decided']) == (None, None)
     assert 0 < figures['latency_us']['median'] <= figures['latency_us']['p99']
 
 

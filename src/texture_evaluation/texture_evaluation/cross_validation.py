@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
+from warnings import catch_warnings, filterwarnings
 
 import numpy as np
 from joblib import Parallel, delayed, parallel_config
@@ -26,12 +27,12 @@ from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.types import AnyArray, Array
 from texture_estimation.evidence import EvidenceAccumulator, single_decisions
 from texture_estimation.model import TextureModel
-from texture_estimation.recipe import Recipe
+from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.training import train
 from texture_evaluation import metrics
 from texture_evaluation.charts import COLOURS, chart, line_styles
 from texture_evaluation.metrics import SlideResult, curve
-from texture_evaluation.train import training_examples
+from texture_evaluation.train import training_examples, unusable
 from texture_features.feature_set import LabelledFeatures
 from texture_recordings.dataset import CONDITIONS, SlideDataset
 
@@ -96,7 +97,7 @@ def _check_cluster(client: Any, address: str) -> None:
 
 
 # --------------------
-# Accuracy of windows and slides, with 95 % intervals by bootstrap over clusters; exact at 0 and 100 %.
+# Accuracy of windows and slides, with 95 % intervals by bootstrap over clusters, widened by what none of them shows.
 
 RESAMPLES, CONFIDENCE = 2000, 0.95  # of the bootstrap
 
@@ -146,15 +147,16 @@ def _accuracy_of(counts: Array, clusters: AnyArray) -> tuple[float | None, list[
 def interval(counts: Array, clusters: Sequence[str] | AnyArray | None = None) -> list[float]:
     """Return the 95 % interval of an accuracy by bootstrap over clusters: answers within one are not independent.
 
-    Where all answers or none are right, every resample is the same: the interval is then the exact one-sided bound on
-    the fraction of clusters, about 3/n wide.
+    A kind of cluster that none of n has shown may still be up to 1 - 0.05^(1/n) of all, and be all right or all wrong:
+    that widens the interval. Source of this bound, which is exact where all answers or none are right: Clopper &
+    Pearson 1934.
     """
     counts = counts if clusters is None else clustered(counts, clusters)
+    counts = counts[counts[:, 1] > 0]
     right, answers = counts.sum(axis=0)
-    if right in (0.0, answers):
-        edge = float((1.0 - CONFIDENCE) ** (1.0 / np.count_nonzero(counts[:, 1])))
-        return [edge, 1.0] if right else [0.0, 1.0 - edge]
-    return _edges(_resampled(counts))
+    shown = float((1.0 - CONFIDENCE) ** (1.0 / len(counts)))  # the least fraction of clusters of a kind that was shown
+    low, high = _edges(_resampled(counts))
+    return [min(low, float(right / answers) * shown), max(high, 1.0 - (1.0 - float(right / answers)) * shown)]
 
 
 def clustered(counts: Array, clusters: Sequence[str] | AnyArray) -> Array:
@@ -524,8 +526,6 @@ ALLOWED = (
 # --------------------
 # Split labelled slides into folds of training and test slides.
 
-SPLIT_ADVICE = 'if each session holds one surface, set `session` in the mapping or use the split stratified'
-
 
 def split_slides(
     dataset: SlideDataset, splitter: Any, groups: str | AnyArray = 'slide'
@@ -547,7 +547,10 @@ def split_slides(
             f'{what}, or use the split stratified:5'
         )
     try:
-        splits = list(splitter.split(np.zeros((len(labels), 1)), labels, columns))
+        with catch_warnings():
+            if isinstance(groups, str) and groups == 'slide':  # the caller gave none
+                filterwarnings('ignore', 'The groups parameter is ignored')
+            splits = list(splitter.split(np.zeros((len(labels), 1)), labels, columns))
     except ValueError as error:
         raise InvalidData(f'the slides cannot be split: {error}; use another split or record more slides') from error
     return [part for train, test in splits for part in _of_other_slides(dataset, train, test)]
@@ -573,17 +576,18 @@ def _of_other_slides(
 Rows = NDArray[np.intp]
 
 
-def of_trained_surfaces(labels: AnyArray, splits: Sequence[tuple[Rows, Rows]]) -> list[tuple[Rows, Rows]]:
+def of_trained_surfaces(
+    labels: AnyArray, splits: Sequence[tuple[Rows, Rows]], *, sessions: bool = False
+) -> list[tuple[Rows, Rows]]:
     """Return splits that test no slide of a surface that they do not train: it could not be right."""
-    if any(len(np.unique(labels[train])) < 2 for train, _ in splits):
-        return list(splits)  # the error of the training is better: it names the fold
     possible = [(train, test[np.isin(labels[test], labels[train])]) for train, test in splits]
     left = [(train, test) for train, test in possible if len(test)]
     if not left:
         trained, tested = (', '.join(np.unique(labels[rows]).tolist()) for rows in splits[0])
+        advice = 'if each session holds one surface, set `session` in the mapping or ' * sessions
         raise InvalidData(
             f'no surface is tested where it is trained; in the first fold, trained are {trained}; tested are {tested}; '
-            f'{SPLIT_ADVICE}'
+            f'{advice}use the split stratified'
         )
     return left
 
@@ -615,7 +619,7 @@ def slide_groups(dataset: SlideDataset, groups: str | AnyArray) -> AnyArray:
 
 
 def cross_validate(
-    recipe: Recipe,
+    recipe: Recipe | str,
     dataset: SlideDataset,
     splitter: Any,
     n_jobs: int | None = None,
@@ -630,7 +634,7 @@ def cross_validate(
     Parameters
     ----------
     recipe
-        Trained again for each fold.
+        Trained again for each fold; or its name or path.
     dataset
         The slides.
     splitter
@@ -658,13 +662,14 @@ def cross_validate(
     Cross-validate the default recipe by leaving one speed out::
 
         dataset = SlideDataset.from_bags(['recordings'])
-        result = cross_validate(load_recipe('default'), dataset, LeaveOneGroupOut(), groups='speed')
+        result = cross_validate('default', dataset, LeaveOneGroupOut(), groups='speed')
         print(result.as_json()['window_accuracy'])
     """
+    recipe = load_recipe(recipe) if isinstance(recipe, str) else recipe
     columns = slide_groups(dataset, groups)
     splits = split_slides(dataset, splitter, groups)
     requested = {row for _, test in splits for row in test.tolist()}
-    splits = of_trained_surfaces(dataset.labels, splits)
+    splits = of_trained_surfaces(dataset.labels, splits, sessions=isinstance(groups, str) and groups == 'session')
     untested = requested - {row for _, test in splits for row in test.tolist()}
     names = dataset.names
     named = [
@@ -681,7 +686,6 @@ def cross_validate(
         for train, test, name in named
     )
     folds = list(progress(done, f"cross-validating '{recipe.name}', folds", len(named)))
-    usable = set(tested.groups.tolist())
     # What is certain of the shift: the condition that was left out, and the bags.
     left_out = SHIFTS.get(groups, '') if isinstance(groups, str) else 'other group'
     sessions = np.array([slide.session for slide in dataset])
@@ -703,7 +707,7 @@ def cross_validate(
         recipe.name,
         tuple(np.unique(dataset.labels).tolist()),
         tuple(folds),
-        tuple(name for name in names.tolist() if name not in usable),
+        tuple(unusable(dataset, tested)),
         shift,
         dict(zip(names.tolist(), clusters, strict=True)),
         'slides' if by_slide else 'clusters (surface × what was left out)',
@@ -739,5 +743,5 @@ def _fold(
     try:
         model = train(recipe, trained)
     except InvalidData as error:
-        raise InvalidData(f"fold '{name}' cannot be trained: {error}; {SPLIT_ADVICE}") from error
+        raise InvalidData(f"fold '{name}' cannot be trained: {error}") from error
     return FoldResult(name, tuple(trained_on.tolist()), predict_slides(model, tested), model)

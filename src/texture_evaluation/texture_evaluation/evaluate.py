@@ -25,7 +25,7 @@ from texture_evaluation.cross_validation import (
     figures,
 )
 from texture_evaluation.metrics import SlideResult
-from texture_evaluation.train import slide_digest
+from texture_evaluation.train import not_counted, slide_digest
 from texture_features.feature_set import fingerprint_difference
 from texture_features.windows import WindowEvent
 from texture_recordings.dataset import SlideDataset, no_window
@@ -58,16 +58,16 @@ class EvaluationReport:
         return sorted({result.surface for result in (*self.known, *self.unknown)})
 
     def as_json(self) -> dict[str, Any]:
-        """Return the figures; null where there is no slide."""
-        nothing = {'accuracy': None, 'mean_s': None}
+        """Return the figures; null where there is no slide, or none was decided."""
         median, p99 = np.percentile(self.latency_us, (50, 99))
         wrong, rejected = metrics.accepted_wrong(self.known), metrics.rejected(self.known)
+        decided = metrics.ended_early(self.known)
         return {
             'shift': self.shift,
             'slides_in_training': list(self.slides_in_training),
             'too_little_training': self.too_little_training,
             **figures(self.known, self.clusters),
-            'early': metrics.early_decision(self.known) if self.known else nothing,
+            'early': metrics.early_decision(self.known) if decided else None,
             'calibration_error': metrics.calibration_error(self.known),
             'n_unknown': len(self.unknown),
             'unknown_accepted': metrics.accepted_wrong(self.unknown)['final'],
@@ -76,7 +76,7 @@ class EvaluationReport:
             'tested': self.tested,
             'confusion': self.confusion.tolist(),
             'latency_us': {'median': float(median), 'p99': float(p99)},
-            'once_decided': {'accepted_wrong': wrong['early'], 'rejected': rejected['early']},
+            'once_decided': {'accepted_wrong': wrong['early'], 'rejected': rejected['early']} if decided else None,
             'rejected': rejected['final'],
             'rejections_of_untrained': metrics.rejections(self.unknown),
         }
@@ -248,13 +248,7 @@ def table(result: CrossValidation, split: str) -> list[str]:
     if result.untested:
         names = ', '.join(f"'{surface}' ({count} slides)" for surface, count in result.untested.items())
         lines.append(f'trained but not tested, as no other slide would train them: {names}')
-    return [*lines, *_unusable(result.unusable), *filter(None, [result.too_little_training])]
-
-
-def _unusable(slides: Sequence[str]) -> list[str]:
-    """Return a line on slides that were not counted, if there are any."""
-    why = 'not counted, as each window lacks samples, has some that are NaN, or is longer than the slide'
-    return [f'{len(slides)} slides are {why}: {", ".join(slides)}'] if slides else []
+    return [*lines, *not_counted(result.unusable), *filter(None, [result.too_little_training])]
 
 
 def by_reason(rejections: Mapping[str, int]) -> str:
@@ -296,15 +290,15 @@ def summary(report: EvaluationReport) -> list[str]:
             ]
         ),
         f'as soon as decided: accuracy {percent(early["accuracy"])}, after {early["mean_s"]:.2f} s on average'
-        if metrics.ended_early(report.known)
+        if figures['once_decided']
         else f'as soon as decided: {undecided}',
         f'processor time of a window: {latency["median"]:.0f} µs median, {latency["p99"]:.0f} µs 99th percentile',
     ]
     if report.known:
         of = f'of the {len(report.known)} slides over trained surfaces'
-        for when, ends in (('at the end', figures), ('once decided', figures['once_decided'])):
-            shown = (f'{name} {percent(ends[key])}' for name, key in ENDS.items() if key in ends)
-            lines.append(f'{of}, {when}: {", ".join(shown)}')
+        for when, ends in (('at the end', figures), ('once decided', figures['once_decided'] or {})):
+            shown = [f'{name} {percent(ends[key])}' for name, key in ENDS.items() if key in ends]
+            lines += [f'{of}, {when}: {", ".join(shown)}'] if shown else []
         lines.append(by_reason(figures['rejections']))
     if report.unknown:
         accepted, ended = percent(figures['unknown_accepted']), percent(figures['unknown_ended_early'])
@@ -317,7 +311,7 @@ def summary(report: EvaluationReport) -> list[str]:
             f'{len(report.slides_in_training)} of {len(report.known)} slides were in the training, so these figures '
             'are optimistic; leave them out with --slides'
         )
-    return [*lines, *_unusable(report.unusable), *report.tare_faults, *filter(None, [report.too_little_training])]
+    return [*lines, *not_counted(report.unusable), *report.tare_faults, *filter(None, [report.too_little_training])]
 
 
 def percent(fraction: float | None) -> str:

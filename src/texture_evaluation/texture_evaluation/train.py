@@ -11,6 +11,7 @@ from pathlib import Path
 
 from texture_core.cli import task
 from texture_core.config import writing
+from texture_core.errors import counted
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.roughness import RoughnessModel, load_roughness_recipe, read_grades, train_grades
@@ -62,6 +63,7 @@ def train_from_bags(
         'sessions': sorted({slide.session for slide in dataset}),
         'slide_digests': sorted(map(slide_digest, dataset)),
         'samples': most,
+        'unusable': not_counted(unusable(dataset, examples)),
     }
     model = replace(model, training={**model.training, **trained_on, **({'tare': faults} if faults else {})})
     if out is not None:
@@ -81,9 +83,11 @@ def train_grades_from_bags(
     """Return a roughness model trained on labelled slides, and save it; a TextureError states what is wrong."""
     plan, table = load_roughness_recipe(recipe), read_grades(grades)
     windows = replace(plan.feature_set, windows=plan.training_windows)
-    examples = SlideDataset.from_bags(bags, slides, namespace, topics=windows.topics).features(windows)
+    dataset = SlideDataset.from_bags(bags, slides, namespace, topics=windows.topics)
+    examples = dataset.features(windows)
     with task(f"fitting '{plan.name}' to {len(examples.y)} windows"):
         model = train_grades(plan, examples, table, _name(out, plan.name))
+    model = replace(model, training={**model.training, 'unusable': not_counted(unusable(dataset, examples))})
     if out is not None:
         _save(model, out, bags, slides, grades=str(grades))
     return model
@@ -94,6 +98,18 @@ def training_examples(recipe: Recipe, dataset: SlideDataset) -> LabelledFeatures
     windows = replace(recipe.feature_set, windows=recipe.training_windows)
     distances_m = recipe.training.distances_m(recipe.feature_set.windows.length_s)
     return dataset.features(windows, recipe.augmentation, distances_m)
+
+
+def unusable(dataset: SlideDataset, features: LabelledFeatures) -> list[str]:
+    """Return the names of the slides that have no window."""
+    used = set(features.groups.tolist())
+    return [name for name in dataset.names.tolist() if name not in used]
+
+
+def not_counted(slides: Sequence[str]) -> list[str]:
+    """Return a line on slides without a usable window, if there are any."""
+    why = 'not counted, as each window lacks samples, has some that are NaN, or is longer than the slide'
+    return [f'{counted(len(slides), "slide")} {why}: {", ".join(slides)}'] if slides else []
 
 
 def slide_digest(slide: LabelledSlide) -> str:

@@ -263,7 +263,7 @@ class SlideDataset:
         unknown = np.flatnonzero(np.isnan(values))
         if len(unknown):
             raise InvalidData(
-                f"slide '{self.slides[unknown[0]].name}' and {len(unknown) - 1} others have no {name}; "
+                f"{len(unknown)} of {len(values)} slides have no {name}, first '{self.slides[unknown[0]].name}'; "
                 f'use slides that were recorded with it, or another condition'
             )
         return _grouped(values, circular=name == 'direction')

@@ -11,7 +11,9 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from texture_core.errors import InvalidData, counted
 from texture_core.types import Array
+from texture_features.feature_set import LabelledFeatures
 
 # --------------------
 # What a learner is: parameters that fit examples, and the predictor that it exports.
@@ -221,6 +223,28 @@ def standardisation(values: Array) -> tuple[Array, Array]:
 
 FORCE = 'force'  # ends the name of the feature
 NOT_COMPARED = (FORCE,)
+
+
+def check_finite(examples: LabelledFeatures) -> None:
+    """Raise InvalidData if a feature of the examples is not finite, with what the slides lack, if that is why."""
+    finite = np.isfinite(examples.values)
+    bad, windows = ~finite.all(axis=0), ~finite.all(axis=1)
+    if not bad.any():
+        return
+    name = examples.names[int(bad.argmax())]
+    needed, quantity = (FORCE, 'force_n') if name.endswith((f'/{FORCE}', '/friction')) else ('speed', 'speed_m_s')
+    slides = np.unique(examples.groups[windows]).tolist()
+    if all(np.isnan(getattr(examples.conditions.get(slide), quantity, 0.0)) for slide in slides):
+        raise InvalidData(
+            f"{len(slides)} of {len(np.unique(examples.groups))} slides came without {needed}, which feature '{name}' "
+            f'needs; record or import them with it (`conditions: {needed}` in a mapping), or take another recipe'
+        )
+    raise InvalidData(
+        f'{windows.sum()} of {len(examples.labels)} windows have no finite value of '
+        f"{counted(int(bad.sum()), 'feature')}, the first '{name}'; leave these features out of the recipe, or these "
+        'windows out of the examples'
+    )
+
 
 # --------------------
 # Means of the rows that belong together, such as the windows of a slide or the slides of a texture.

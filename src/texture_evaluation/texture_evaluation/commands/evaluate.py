@@ -94,9 +94,8 @@ def _cross_validate(options: argparse.Namespace) -> int:
     print('\n'.join([*(line for result in results for line in table(result, split.name)), *map(sentence, compared)]))
     if options.json:
         figures = [result.as_json() for result in results]
-        several = {'recipes': figures, 'comparisons': [vars(one) for one in compared]}
         setting = {'split': split.name, 'seed': options.seed, 'bags': bags, 'slides': options.slides or 'all'}
-        write_json({**setting, **(figures[0] if len(figures) == 1 else several)}, options.json)
+        write_json({**setting, 'recipes': figures, 'comparisons': [vars(one) for one in compared]}, options.json)
     if options.chart:
         of = ', '.join(Path(bag).name for bag in bags)
         surfaces = counted(len(results[0].labels), 'surface')

@@ -92,6 +92,7 @@ def summary(model: TextureModel, out: Path) -> list[str]:
         f'from {training["slides"]} slides, {training["windows"]} windows of {training["window_s"]:g} s; {held_out}',
         *_unfit(model, None if few else accuracy),
         *_uneven(slides),
+        *training.get('unusable', []),
         *training.get('tare', []),
         *filter(
             None, [model.acceptance.reason or model.acceptance.decided_reason, model.acceptance.domain.reach_reason]
@@ -138,6 +139,7 @@ def graded_summary(model: RoughnessModel, out: Path) -> list[str]:
     return [
         f"recipe '{model.recipe.name}' trained on the grades of {training['textures']} textures",
         f'from {training["slides"]} slides, {training["windows"]} windows of {training["window_s"]:g} s; {held_out}',
+        *training.get('unusable', []),
         _saved_as(out),
     ]
 
