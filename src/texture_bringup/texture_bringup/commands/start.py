@@ -42,6 +42,7 @@ from texture_core.config import (
     parameter_sections,
     parameters_of,
     reaches,
+    ros_domain,
 )
 from texture_core.errors import InvalidLaunch, InvalidParameter, LaunchFailed, TextureError, UnknownName
 
@@ -57,6 +58,7 @@ def _configure_launch(parser: argparse.ArgumentParser) -> None:
 
 def _launch(options: argparse.Namespace) -> int:
     """Run the nodes until they end or Ctrl-C; return 2 if a needed one was started wrongly, 1 if one died, else 0."""
+    ros_domain()
     nodes = read(find_launch_file(options.file), given_arguments(options.arguments), os.environ)
     refuse_wrong(nodes)
     for line in raised_limits(nodes):
