@@ -5,6 +5,7 @@ import threading
 import time
 from contextlib import ExitStack, contextmanager, nullcontext
 from functools import partial
+from unittest.mock import MagicMock
 
 import pytest
 import rclpy
@@ -12,6 +13,7 @@ from rclpy.action import ActionServer, CancelResponse
 from rclpy.context import Context
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
+from rclpy.task import Future
 from std_srvs.srv import Trigger
 from texture_msgs import action, msg
 
@@ -141,6 +143,17 @@ def test_ctrl_c_says_that_the_robot_must_be_looked_at_when_the_explorer_does_not
         sent.append(True)
         with pytest.raises(KeyboardInterrupt, match=r'has not confirmed within 0\.5 s that the finger was lifted'):
             operator.explore(ExplorationRequest('linear_slide'))
+
+
+def test_ctrl_c_once_more_does_not_end_the_wait_for_the_end_of_the_exploration(monkeypatch):
+    monkeypatch.setattr(operators, 'CANCEL_DEADLINE_S', 0.5)
+    ending, before = Future(), signal.signal(signal.SIGINT, signal.default_int_handler)  # as the command does
+    try:
+        with operators.Operator(domain_id=DOMAIN) as operator:
+            operator._executor.create_task(signal.raise_signal, signal.SIGINT)
+            assert 'has not confirmed' in str(operator._cancel(MagicMock(), ending))
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def test_ctrl_c_after_the_motion_was_completed_tells_its_id():

@@ -9,7 +9,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -319,11 +319,14 @@ class Operator:
             withdrawn = self._withdraw(goal_id)
             self._complete(withdrawn, CONFIRM_S)
             confirmed = withdrawn.done() and withdrawn.result().goals_canceling  # none if the goal is unknown there
-            how = 'it has confirmed' if confirmed else 'look at the robot: it has not confirmed'
-            raise MotionAborted(f'{error}; {how} that the request is withdrawn') from error
+            raise MotionAborted(
+                f'{error}; {"it has" if confirmed else "look at the robot: it has not"} confirmed that the request is '
+                'withdrawn'
+            ) from error
         except KeyboardInterrupt:  # the explorer may have the request already
             self._withdraw(goal_id)
-            self._complete(accepted, CANCEL_DEADLINE_S)
+            with suppress(KeyboardInterrupt):
+                self._complete(accepted, CANCEL_DEADLINE_S)
             goal = accepted.result()
             raise (self._cancel(goal, goal.get_result_async()) if goal else _unconfirmed()) from None
         goal, cancelled = accepted.result(), False
@@ -542,10 +545,10 @@ class Operator:
             self._executor.spin_once(timeout_sec=STEP_S)
 
     def _complete(self, future: Future, deadline_s: float) -> None:
-        """Spin until a future is done or the time is over; the guard is not asked."""
+        """Spin until a future is done or the time is over, and raise Ctrl-C only then; the guard is not asked."""
         end_s = time.monotonic() + deadline_s
-        while not future.done() and time.monotonic() < end_s:
-            with uninterrupted():
+        with uninterrupted():
+            while not future.done() and time.monotonic() < end_s:
                 self._executor.spin_once(timeout_sec=STEP_S)
 
     def _withdraw(self, goal_id: Any) -> Future:
@@ -556,7 +559,7 @@ class Operator:
     def _cancel(self, goal: Any, ending: Future) -> Interrupted:
         """Cancel, wait until the finger is lifted, and return how it ended."""
         goal.cancel_goal_async()
-        with task(f'waiting for the end of the exploration; {EMERGENCY}'):
+        with suppress(KeyboardInterrupt), task(f'waiting for the end of the exploration; {EMERGENCY}'):
             self._complete(ending, CANCEL_DEADLINE_S)
         if not ending.done():
             return _unconfirmed()
