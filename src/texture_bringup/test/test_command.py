@@ -104,6 +104,42 @@ def test_a_shell_completes_sub_commands_and_options(line, wanted):
     assert wanted in done.stdout.split()
 
 
+def ran(setting: str, *before: str, **environment: str) -> tuple[int, str]:
+    """Return the exit code of a program that prepares something and runs the command, and what it reports."""
+    script = f'import atexit, signal, sys; from texture_bringup import command; {setting}; sys.exit(command.program())'
+    done = subprocess.run(
+        [*before, sys.executable, '-c', script],
+        env={**os.environ, **environment},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return done.returncode, done.stderr
+
+
+@pytest.mark.parametrize(('before', 'end'), [([], (130, 'texture: interrupted\n')), (['nohup'], (0, ''))])
+def test_a_closed_terminal_interrupts_a_command_unless_it_runs_under_nohup(before, end):
+    closed = 'lambda: command.run_program(lambda: signal.raise_signal(signal.SIGHUP) or 0)'
+    assert ran(f'command.main = {closed}', *before) == end
+
+
+def test_ctrl_c_once_more_while_the_program_ends_shows_no_traceback():
+    again = 'atexit.register(lambda: signal.raise_signal(signal.SIGINT))'
+    assert ran(f'command.main = lambda: 130; {again}') == (130, '')
+
+
+@pytest.mark.parametrize(
+    ('command', 'domain'),
+    [('stop', 'abc'), ('explore linear_slide', '-1'), ('launch emulator', '233'), ('dashboard', '900')],
+)
+def test_a_domain_that_ros_cannot_have_is_refused_with_the_allowed_range(command, domain):
+    code, said = ran(f'sys.argv[1:] = {command.split()}', ROS_DOMAIN_ID=domain)
+    lines = [line for line in said.splitlines() if not line.startswith('loading the libraries ')]  # on a busy machine
+    wanted = f"texture: ROS_DOMAIN_ID is '{domain}'; set it to a whole number from 0 to 232, or unset it"
+    assert (code, lines) == (2, [wanted])
+
+
 NODES = {'tare': 'sensor'}  # the others are of the explorer
 SERVICES = ['stop', 'recover', 'lift', 'touch-surface', 'forget-touches', 'tare']
 

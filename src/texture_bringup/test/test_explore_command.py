@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from texture_bringup.command import main
-from texture_bringup.commands.explore import explored
+from texture_bringup.commands.explore import explore, explored, requests_of
 from texture_bringup.feed import texture_text
 from texture_bringup.operator import ExplorationResult, Operator
-from texture_core.cli import run_program
+from texture_core.cli import Parser, run_program
 from texture_core.errors import ExplorationError, MotionAborted
 from texture_core.types import (
     ExplorationRequest,
@@ -28,11 +28,13 @@ from texture_core.types import (
     TextureEstimate,
 )
 from texture_estimation.next_motion import NextTouchModel
+from texture_exploration.safety import RANGES
 from texture_features.correction import write_reference
 
 pytestmark = pytest.mark.ros
 
 OUTSIDE = 'outside the training: speed 0.02 m/s, trained 0.05 m/s'
+LEFT_OUT = '2 of 7 windows were left out; too little training: 5 slides could be held out'
 ENDED = 'the exploration has ended: cancelled by the client'
 
 
@@ -82,13 +84,23 @@ def test_what_was_asked_for_beside_a_preset_reaches_each_of_its_motions(monkeypa
     operator = MagicMock()
     operator.__enter__.return_value.explore.return_value = made
     monkeypatch.setattr('texture_bringup.commands.explore.Operator', lambda _namespace: operator)
-    main(['explore', '--preset', 'ets-linear', '--repeats', '2', '--surface', 'oak', '--early-stopping', '--timeout', '9'])
+    more = ['--surface', 'oak', '--early-stopping', '--timeout', '9']
+    main(['explore', '--preset', 'ets-linear', '--repeats', '2', *more])
     main(['explore', 'linear_slide', '--repeats', '2', '--direction', '0', '90'])
     asked = [call.args[0] for call in operator.__enter__.return_value.explore.call_args_list]
     preset, slides = asked[:-4], asked[-4:]
     assert preset == 2 * preset[: len(preset) // 2]
     assert {(one.surface, one.early_stopping, one.timeout_s) for one in preset} == {('oak', True, 9.0)}
     assert [round(math.degrees(one.direction_rad)) for one in slides] == [0, 90, 0, 90]
+
+
+def test_each_number_of_a_motion_has_an_option_that_is_its_name_without_the_unit():
+    parser = Parser()
+    explore.configure(parser)
+    given = {'speed': 0.1, 'force': 2.0, 'distance': 0.3, 'radius': 0.04, 'turns': 5.0, 'duration': 6.0}
+    words = [word for name, value in given.items() for word in (f'--{name}', str(value))]
+    [request] = requests_of(parser.parse_args(['circular', *words]))
+    assert {name: getattr(request, name) for name in RANGES} == dict(zip(RANGES, given.values(), strict=True))
 
 
 def test_identify_makes_the_slide_that_distinguishes_textures_until_one_is_decided(monkeypatch, capsys):
@@ -126,6 +138,7 @@ def test_identify_makes_the_slide_that_distinguishes_textures_until_one_is_decid
         (Rejection.NOVEL, '', 'it resembles no trained texture'),
         (Rejection.AMBIGUOUS, '', 'ambiguous'),
         (Rejection.TOO_LITTLE_TRAINING, '', 'too little training'),
+        (Rejection.TOO_LITTLE_TRAINING, LEFT_OUT, LEFT_OUT),
     ],
 )
 def test_an_estimate_that_is_not_known_leads_with_that_and_says_why(rejection, message, reason):

@@ -5,6 +5,7 @@
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 from dataclasses import replace
@@ -119,6 +120,32 @@ def test_an_argument_of_a_file_that_is_not_included_now_is_accepted() -> None:
     assert 'dashboard' not in [node.executable for node in nodes]
 
 
+@pytest.mark.parametrize(
+    ('stopped', 'number', 'code', 'sentence'),
+    [
+        ('launch', signal.SIGINT, 130, 'texture: interrupted'),
+        ('launch', signal.SIGTERM, 130, 'texture: interrupted'),
+        ('check', signal.SIGKILL, 2, 'texture: what checks the arguments has ended without an answer'),
+    ],
+)
+def test_a_launch_that_is_stopped_while_it_checks_its_arguments_ends_and_leaves_no_process(
+    stopped, number, code, sentence
+) -> None:
+    script = (
+        'import os, sys, time; from texture_bringup import command; from texture_bringup.commands import start; '
+        'start._check = lambda _: print(os.getpid(), flush=True) or time.sleep(600); sys.exit(command.program())'
+    )
+    given = [sys.executable, '-c', script, 'launch', 'emulator']
+    with subprocess.Popen(given, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as launch:
+        check = int(launch.stdout.readline())
+        os.kill(check if stopped == 'check' else launch.pid, number)
+        said = launch.communicate(timeout=60.0)[1].splitlines()[-1]
+    assert launch.returncode == code
+    assert said.startswith(sentence)
+    with pytest.raises(ProcessLookupError):
+        os.kill(check, 0)
+
+
 @pytest.mark.parametrize('launch', ['emulator', 'ur', 'ros_controllers', 'rails', 'hand'])
 @pytest.mark.parametrize(
     ('lines', 'sentence'),
@@ -204,9 +231,13 @@ def test_the_models_are_good_and_the_figures_are_written(data, capsys, tmp_path)
         ('add silk --undo', 'label of the texture'),
         ('explore linear_slid', "did you mean 'linear_slide'"),
         ('explore --preset jamali --repeats -1', '--repeats is -1'),
-        ('explore --preset ets-linear --speed 0.02 --force 0.5', '--speed, --force came with --preset, whose motions have'),
+        (
+            'explore --preset ets-linear --speed 0.02 --force 0.5',
+            '--speed, --force came with --preset, whose motions have',
+        ),
         ('explore --preset kaboli --direction 45', '--direction came with --preset'),
-        ('explore', 'give the motion, such as linear_slide, or --preset NAME'),
+        ('explore', 'give either a motion, such as linear_slide, or --preset NAME'),
+        ('explore circular --preset ets-linear', "'circular' and the preset 'ets-linear' came; give either a motion"),
         ('collect cork out --force 6 3', "'force_low_n' is 6; it must not be above 'force_high_n', 3"),
         ('collect cork fast.npz', "'fast.npz' cannot be the folder of the bags: it is a file; name another"),
         ('collect cork /proc/none', "'/proc/none' cannot be the folder of the bags: No such file or directory"),

@@ -5,6 +5,7 @@ import threading
 import time
 from contextlib import ExitStack, contextmanager, nullcontext
 from functools import partial
+from unittest.mock import MagicMock
 
 import pytest
 import rclpy
@@ -12,6 +13,7 @@ from rclpy.action import ActionServer, CancelResponse
 from rclpy.context import Context
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
+from rclpy.task import Future
 from std_srvs.srv import Trigger
 from texture_msgs import action, msg
 
@@ -84,7 +86,7 @@ def test_a_wrong_namespace_is_named_with_those_that_have_an_explorer():
             graph.add(partial(rclpy.create_node, 'explorer', namespace=namespace))
         with pytest.raises(
             LaunchFailed,
-            match=r"in the namespace '/lefft' .* explorers in /left, /right: choose .* also of `texture dashboard`",
+            match=r'ROS_DOMAIN_ID 62 and namespace /lefft \(.* explorers in /left, /right: choose .* `texture dash',
         ):
             operator.wait_for_explorer(5.0)
 
@@ -110,6 +112,15 @@ def test_an_aborted_exploration_says_that_the_finger_was_lifted_if_that_is_known
         assert (ended.message, ended.lifted) == (f'the explorer was {ending}', lifted)
 
 
+def test_an_explorer_that_fails_without_a_word_is_no_success_and_the_operator_reads_where_to_look():
+    with silent_explorer(result=msg.ExplorationResult()), operators.Operator(domain_id=DOMAIN) as operator:
+        operator.wait_for_explorer(30.0)
+        with pytest.raises(
+            MotionAborted, match=r'has failed and gives no reason; look at the robot, and at the output'
+        ):
+            operator.explore(ExplorationRequest('linear_slide'))
+
+
 def test_an_explorer_that_does_not_keep_the_timeout_is_left(monkeypatch):
     monkeypatch.setattr(operators, 'CANCEL_DEADLINE_S', 0.5)
     with silent_explorer(), operators.Operator(domain_id=DOMAIN) as operator:
@@ -132,6 +143,17 @@ def test_ctrl_c_says_that_the_robot_must_be_looked_at_when_the_explorer_does_not
         sent.append(True)
         with pytest.raises(KeyboardInterrupt, match=r'has not confirmed within 0\.5 s that the finger was lifted'):
             operator.explore(ExplorationRequest('linear_slide'))
+
+
+def test_ctrl_c_once_more_does_not_end_the_wait_for_the_end_of_the_exploration(monkeypatch):
+    monkeypatch.setattr(operators, 'CANCEL_DEADLINE_S', 0.5)
+    ending, before = Future(), signal.signal(signal.SIGINT, signal.default_int_handler)  # as the command does
+    try:
+        with operators.Operator(domain_id=DOMAIN) as operator:
+            operator._executor.create_task(signal.raise_signal, signal.SIGINT)
+            assert 'has not confirmed' in str(operator._cancel(MagicMock(), ending))
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def test_ctrl_c_after_the_motion_was_completed_tells_its_id():
@@ -226,16 +248,17 @@ def test_who_watches_sees_no_state_that_was_sent_long_before(monkeypatch):
     assert seen() == ['new']
 
 
-def test_ctrl_c_ends_the_program_behind_what_rclpy_does_and_not_within():
-    done, before = [], signal.signal(signal.SIGINT, signal.default_int_handler)  # as the command does
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_ctrl_c_or_a_closed_terminal_ends_the_program_behind_what_rclpy_does_and_not_within(number):
+    done, before = [], signal.signal(number, signal.default_int_handler)  # as the command does
     try:
         with pytest.raises(KeyboardInterrupt), operators.uninterrupted():
-            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(number)
             done.append('taken')
         assert done == ['taken']
-        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        assert signal.getsignal(number) is signal.default_int_handler
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.signal(number, before)
 
 
 def test_an_explorer_that_connects_to_its_arm_is_waited_for_and_the_wait_says_so(monkeypatch):

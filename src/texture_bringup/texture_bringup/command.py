@@ -25,7 +25,7 @@ from functools import cache, partial
 from importlib.metadata import EntryPoint, entry_points, version
 from typing import cast
 
-from texture_core.cli import Command, Parser, run_program, show_progress, task
+from texture_core.cli import INTERRUPTED, Command, Parser, run_program, show_progress, task
 from texture_core.config import find
 
 GROUP, PACKAGE = 'texture.commands', 'texture_bringup'
@@ -79,11 +79,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def program() -> int:
     """Run the command as a process, which shuts down in order when it is asked to stop."""
     # Also where a shell has started the command in the background and made it ignore Ctrl-C.
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    stopping = [signal.SIGINT, signal.SIGTERM]
     if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # closed terminal; ignored under nohup
-        signal.signal(signal.SIGHUP, signal.default_int_handler)
-    return main()
+        stopping.append(signal.SIGHUP)
+    for number in stopping:
+        signal.signal(number, signal.default_int_handler)
+    try:
+        return main()
+    finally:
+        for number in stopping:  # another one ends what libraries do at the end, without a traceback
+            signal.signal(number, lambda *_: os._exit(INTERRUPTED))
 
 
 def _dispatch(given: Sequence[str]) -> int:

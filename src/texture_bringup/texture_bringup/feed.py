@@ -193,14 +193,14 @@ def in_words(value: IntEnum) -> str:
 
 
 def texture_text(estimate: TextureEstimate) -> str:
-    """Return a texture estimate as text; of a rejected one first the reason, then what else the classifier notes."""
+    """Return a texture estimate as text, of a rejected one with the reason, once, and what the classifier notes."""
     if not estimate.label and not estimate.windows:
         return estimate.message or 'none yet'
     nearest = f'{estimate.label or "several"}, confidence {estimate.confidence:.2f} after {estimate.evidence_s:.1f} s'
     if estimate.accepted:
         return nearest
     reason, note = REASONS.get(estimate.rejection, in_words(estimate.rejection)), estimate.message
-    why = note if note.startswith(reason) else '; '.join(filter(None, (reason, note)))
+    why = note if reason in note else '; '.join(filter(None, (reason, note)))
     return f'unknown (nearest: {nearest}): {why}'
 
 

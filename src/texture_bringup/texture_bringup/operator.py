@@ -9,7 +9,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -36,7 +36,7 @@ from texture_msgs import action, msg, srv
 from texture_bringup.feed import Feed
 from texture_bringup.launcher import MAY_PRESS, typed
 from texture_core.cli import task
-from texture_core.config import unknown_name
+from texture_core.config import ros_domain, unknown_name
 from texture_core.errors import (
     ExplorationError,
     InvalidData,
@@ -167,10 +167,9 @@ STEPS: Mapping[bool, Mapping[str, int]] = {
     True: {'unconfigured': Transition.TRANSITION_CONFIGURE, 'inactive': Transition.TRANSITION_ACTIVATE},
     False: {'active': Transition.TRANSITION_DEACTIVATE},
 }
-VANISHED = (
-    'the explorer has vanished; if it was exploring, the finger may still touch the surface: look at the robot, and at '
-    'the output of the explorer'
-)
+LOOK = 'look at the robot, and at the output of the explorer'
+VANISHED = f'the explorer has vanished; if it was exploring, the finger may still touch the surface: {LOOK}'
+FAILED = f'the explorer has failed and gives no reason; {LOOK}'
 Progress = Callable[[ExplorationState, TextureEstimate], None]
 
 
@@ -216,7 +215,7 @@ def _given_up(goal: Any, why: str) -> MotionAborted:
 
 def _message(result: Any) -> str:
     """Return how an exploration ended, and of an aborted one that the finger was lifted, if that is known."""
-    return f'{result.message}{"; the finger was lifted" * bool(result.error_code and result.lifted)}'
+    return f'{result.message or FAILED}{"; the finger was lifted" * bool(result.error_code and result.lifted)}'
 
 
 class Operator:
@@ -227,7 +226,8 @@ class Operator:
     ) -> None:
         self._guard = guard
         self._context = Context()
-        self._context.init(args=[], domain_id=domain_id)  # not those of the command: NAME:=VALUE would remap
+        self._domain_id = ros_domain() if domain_id is None else domain_id
+        self._context.init(args=[], domain_id=self._domain_id)  # not those of the command: NAME:=VALUE would remap
         self._node = Node('operator', namespace=namespace or None, context=self._context, enable_rosout=False)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
@@ -243,17 +243,19 @@ class Operator:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._explore.destroy()
-        self._executor.shutdown()
-        self._node.destroy_node()
-        self._context.try_shutdown()
+        with uninterrupted():
+            self._explore.destroy()
+            self._executor.shutdown()
+            self._node.destroy_node()
+            self._context.try_shutdown()
 
     def wait_for_explorer(self, deadline_s: float, quiet_s: float | None = None) -> None:
         """Wait until explorations can be requested; the wait is shown after `quiet_s`."""
         advice, ours = 'start one, such as the emulator with `texture launch emulator`', self._node.get_namespace()
+        missing = f'no explorer answers in the ROS_DOMAIN_ID {self._domain_id} and namespace {ours}'
         try:
             with task(f"waiting for an explorer in the namespace '{ours}', which may be starting", quiet_s=quiet_s):
-                self.wait_until(self._explore.server_is_ready, deadline_s, f'no explorer answers; {advice}')
+                self.wait_until(self._explore.server_is_ready, deadline_s, f'{missing}; {advice}')
         except KeyboardInterrupt:
             raise KeyboardInterrupt('nothing was requested') from None
         except LaunchFailed as error:
@@ -262,8 +264,7 @@ class Operator:
             if not others:
                 raise
             raise LaunchFailed(
-                f"no explorer answers in the namespace '{ours}' (waited {deadline_s:.0f} s); there are explorers in "
-                f'{others}: {CHOOSE}'
+                f'{missing} (waited {deadline_s:.0f} s); there are explorers in {others}: {CHOOSE}'
             ) from error
 
     def wait_for_node(self, name: str, deadline_s: float) -> None:
@@ -303,8 +304,9 @@ class Operator:
             self._heard_s = time.monotonic()
             on_progress(from_msg(message.feedback.state), from_msg(message.feedback.texture))
 
-        hear = (msg.ExplorationState, 'exploration', self._hear, STATE_QOS)
-        self._states = self._states or self._node.create_subscription(*hear, raw=True)
+        self._states = self._states or self._node.create_subscription(
+            msg.ExplorationState, 'exploration', self._hear, STATE_QOS, raw=True
+        )
         goal_id = GoalInfo().goal_id
         goal_id.uuid = list(uuid4().bytes)
         self._complete(Future(), STEP_S)  # a caller who waited for something else has not heard of a stop yet
@@ -317,11 +319,14 @@ class Operator:
             withdrawn = self._withdraw(goal_id)
             self._complete(withdrawn, CONFIRM_S)
             confirmed = withdrawn.done() and withdrawn.result().goals_canceling  # none if the goal is unknown there
-            how = 'it has confirmed' if confirmed else 'look at the robot: it has not confirmed'
-            raise MotionAborted(f'{error}; {how} that the request is withdrawn') from error
+            raise MotionAborted(
+                f'{error}; {"it has" if confirmed else "look at the robot: it has not"} confirmed that the request is '
+                'withdrawn'
+            ) from error
         except KeyboardInterrupt:  # the explorer may have the request already
             self._withdraw(goal_id)
-            self._complete(accepted, CANCEL_DEADLINE_S)
+            with suppress(KeyboardInterrupt):
+                self._complete(accepted, CANCEL_DEADLINE_S)
             goal = accepted.result()
             raise (self._cancel(goal, goal.get_result_async()) if goal else _unconfirmed()) from None
         goal, cancelled = accepted.result(), False
@@ -343,13 +348,16 @@ class Operator:
             raise self._cancel(goal, endings[0]) from None
         answer = next((ending.result() for ending in endings if ending.done()), None)
         if answer is None:
-            late = f'no result within the timeout of {request.timeout_s:g} s; the exploration was cancelled'
-            raise _given_up(goal, late)
+            raise _given_up(
+                goal, f'no result within the timeout of {request.timeout_s:g} s; the exploration was cancelled'
+            )
         if answer.status == GoalStatus.STATUS_UNKNOWN:
             raise MotionAborted(
                 f'the explorer was restarted and does not know this exploration, which was aborted; {MAY_PRESS}'
             )
         result = answer.result.result
+        if not result.message:
+            raise MotionAborted(FAILED)
         return ExplorationResult(
             ExplorationError(result.error_code),
             _message(result),
@@ -537,10 +545,10 @@ class Operator:
             self._executor.spin_once(timeout_sec=STEP_S)
 
     def _complete(self, future: Future, deadline_s: float) -> None:
-        """Spin until a future is done or the time is over; the guard is not asked."""
+        """Spin until a future is done or the time is over, and raise Ctrl-C only then; the guard is not asked."""
         end_s = time.monotonic() + deadline_s
-        while not future.done() and time.monotonic() < end_s:
-            with uninterrupted():
+        with uninterrupted():
+            while not future.done() and time.monotonic() < end_s:
                 self._executor.spin_once(timeout_sec=STEP_S)
 
     def _withdraw(self, goal_id: Any) -> Future:
@@ -551,7 +559,7 @@ class Operator:
     def _cancel(self, goal: Any, ending: Future) -> Interrupted:
         """Cancel, wait until the finger is lifted, and return how it ended."""
         goal.cancel_goal_async()
-        with task(f'waiting for the end of the exploration; {EMERGENCY}'):
+        with suppress(KeyboardInterrupt), task(f'waiting for the end of the exploration; {EMERGENCY}'):
             self._complete(ending, CANCEL_DEADLINE_S)
         if not ending.done():
             return _unconfirmed()

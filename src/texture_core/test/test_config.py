@@ -10,6 +10,7 @@ import sys
 import tracemalloc
 import zipfile
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -36,7 +37,7 @@ from texture_core.config import (
     read_text,
     yaml_text,
 )
-from texture_core.errors import InvalidParameter, UnknownName
+from texture_core.errors import InvalidParameter, MissingLibrary, UnknownName
 
 
 def test_an_unknown_name_is_answered_with_the_nearest() -> None:
@@ -78,6 +79,11 @@ def test_an_error_in_a_users_module_is_told_with_its_file_and_line(
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(UnknownName, match=re.escape(f'fails with {error} ({file}:2); correct it there')):
         find({}, 'users_module_with_a_fault:Thing', 'feature')
+
+
+def test_what_a_missing_library_is_needed_for_is_known_when_another_process_misses_it() -> None:
+    error = MissingLibrary('rosbags', 'bags', 'bags')
+    assert str(copy(error)) == str(error)  # as it goes between processes
 
 
 def test_an_empty_choice_is_not_listed() -> None:

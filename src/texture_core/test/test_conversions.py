@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import fields
+from dataclasses import fields, make_dataclass
 from typing import Any, get_type_hints
 
 import numpy as np
@@ -15,7 +15,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from texture_msgs import msg
 
 from texture_core.errors import ExplorationError, InvalidData
-from texture_core.ros import frame_name, from_msg, to_msg
+from texture_core.ros import CODEC, frame_name, from_msg, to_msg
 from texture_core.types import DATA_CLASSES, Array, ExplorationRequest, ExplorationState, Phase, Rejection
 
 pytestmark = pytest.mark.ros
@@ -56,6 +56,15 @@ def test_a_value_survives_the_wire(cls: type) -> None:
     back = from_msg(deserialize_message(serialize_message(message), type(message)))
     for item in fields(value):  # type: ignore[arg-type]
         np.testing.assert_equal(getattr(back, item.name), getattr(value, item.name))
+
+
+def test_a_message_that_lacks_a_field_of_its_data_class_is_older_than_the_code() -> None:
+    newer = make_dataclass('ExplorationRequest', [('bend_rad', float, 0.0)], bases=(ExplorationRequest,), frozen=True)
+    sentence = 'ExplorationRequest has no bend_rad: the messages are older than the code; run `make setup`'
+    with pytest.raises(InvalidData, match=sentence):
+        to_msg(newer('linear_slide'))
+    with pytest.raises(InvalidData, match=sentence):
+        CODEC.from_message(msg.ExplorationRequest(motion='linear_slide'), newer)
 
 
 @pytest.mark.parametrize('seconds', [math.nan, math.inf, 1e10])

@@ -359,6 +359,19 @@ def _real(path: str | Path) -> Path:
     return Path(path).expanduser().resolve()
 
 
+MAX_DOMAIN = 232  # above it the ports would be
+
+
+def ros_domain() -> int:
+    """Return the domain of ROS in which this process communicates."""
+    text = os.environ.get('ROS_DOMAIN_ID') or '0'
+    if not (text.isdecimal() and int(text) <= MAX_DOMAIN):
+        raise InvalidParameter(
+            f"ROS_DOMAIN_ID is '{text}'; set it to a whole number from 0 to {MAX_DOMAIN}, or unset it"
+        )
+    return int(text)
+
+
 def ros_namespace(text: str) -> str:
     """Return a namespace of ROS as it was given; InvalidParameter if it cannot be one."""
     if not re.fullmatch(r'/?([A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?/?', text):

@@ -121,6 +121,9 @@ class MissingLibrary(TextureError):
             f"'{extra}' names"
         )
 
+    def __reduce__(self) -> tuple[type[TextureError], tuple[str]]:
+        return TextureError, (str(self),)  # from another process
+
 
 class LaunchFailed(TextureError):
     """A node that died, or did not come up in time."""

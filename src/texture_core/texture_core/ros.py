@@ -47,7 +47,7 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Header
 from texture_msgs import msg
 
-from texture_core.config import Parameter, check_parameter_file, from_mapping, parameters_of, unknown_name
+from texture_core.config import Parameter, check_parameter_file, from_mapping, parameters_of, ros_domain, unknown_name
 from texture_core.errors import InvalidParameter, TextureError
 from texture_core.types import (
     DATA_CLASSES,
@@ -335,6 +335,7 @@ def run(
         for option, text in _SOURCES:
             if option == '--params-file':
                 check_parameter_file(Path(text))
+        ros_domain()
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = make_node()
         check_names(node)

@@ -514,6 +514,13 @@ class MessageCodec:
             )
             for name, kind in types.items()
         ]
+        kind = self._kind(f'texture_msgs/msg/{cls.__name__}')
+        known = {*dir(kind), *getattr(kind, '__annotations__', ())}
+        if missing := [there for _, there, _, _ in rest if there not in known]:
+            raise InvalidData(
+                f'the message {cls.__name__} has no {" or ".join(missing)}: the messages are older than the code; run '
+                '`make setup` and start the nodes again'
+            )
         return self._plans.setdefault(cls, (stamp, has_position, rest))
 
     def _time(self, name: str, time_ns: int) -> Any:

@@ -10,13 +10,20 @@ import pytest
 from texture_core.config import folder, shipped
 from texture_core.errors import TextureError
 from texture_core.types import Array
-from texture_estimation.recipe import Recipe, load_recipe
-from texture_estimation.roughness import load_roughness_recipe
-from texture_features.feature_set import InputFeatures
+from texture_estimation.evidence_rules import EVIDENCE_RULES
+from texture_estimation.recipe import LEARNERS, Recipe, load_recipe
+from texture_estimation.roughness import REGRESSORS, load_roughness_recipe
+from texture_features.feature_set import FEATURES, InputFeatures
 from texture_features.windows import WindowBatch
 
 SHIPPED = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
+PARTS = {**FEATURES, **LEARNERS, **REGRESSORS, **EVIDENCE_RULES}
 INPUTS = {'inputs': {'signal': {'features': ['hjorth']}}}
+
+
+@pytest.mark.parametrize('name', sorted(PARTS))
+def test_a_part_of_a_recipe_shows_in_a_doctest_how_it_is_used(name):
+    assert '>>> ' in PARTS[name].__doc__, f'give the docstring of {PARTS[name].__name__} an example, as the others have'
 
 
 @pytest.mark.parametrize('name', SHIPPED)

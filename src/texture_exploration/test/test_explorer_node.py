@@ -229,17 +229,31 @@ def test_a_sensor_that_falls_silent_in_the_slide_ends_it_and_the_next_exploratio
     assert world.explored(**QUICK).error_code == OK
 
 
-def test_an_abort_is_logged_as_a_warning_and_a_finger_that_was_not_lifted_as_an_error():
-    logged, stopped = [], ExplorationError.STOPPED
+def logging_into(logged, **values):
+    """Return what stands for an explorer with some values and logs pairs of level and text into a list."""
     levels = ('info', 'warning', 'error')
     logger = SimpleNamespace(**{name: partial(lambda name, text: logged.append((name, text)), name) for name in levels})
+    return SimpleNamespace(get_logger=lambda: logger, **values)
+
+
+@pytest.mark.parametrize(
+    ('starts', 'said'), [(True, ('warning', 'no arm; the next request tries again')), (False, ('error', 'no arm'))]
+)
+def test_an_arm_that_is_not_there_is_a_warning_at_the_start_where_both_may_be_starting(starts, said):
+    logged = []
+    assert not ExplorerNode._tried(logging_into(logged, _autostart=starts), Mock(side_effect=DeviceError('no arm')))
+    assert logged == [said]
+
+
+def test_an_abort_is_logged_as_a_warning_and_a_finger_that_was_not_lifted_as_an_error():
+    logged, stopped = [], ExplorationError.STOPPED
     for outcome in (
         ExplorationOutcome(ExplorationError.NONE, 'done', True),
         ExplorationOutcome(stopped, 'stopped', True),
         ExplorationOutcome(stopped, 'no lift', True, lifted=False),
         STILL_MOVING,
     ):
-        ExplorerNode._log_end(SimpleNamespace(get_logger=lambda: logger), '17', outcome)
+        ExplorerNode._log_end(logging_into(logged), '17', outcome)
     assert logged == [
         ('info', '17: done'),
         ('warning', '17: stopped; the finger was lifted'),

@@ -22,14 +22,14 @@ MOST_M = 100.0  # of a place, and of a speed in m/s: no arm has more
 
 
 MAX_DISTANCE_M = 1.0
-# Range of a request: lowest, highest and unit. A number is the same for every robot; a name is a configurable limit.
-RANGES: Mapping[str, tuple[float | str, float | str, str]] = {
-    'speed_m_s': (0.002, 'max_speed_m_s', 'm/s'),
-    'force_n': ('min_force_n', 'max_force_n', 'N'),
-    'distance_m': (0.002, MAX_DISTANCE_M, 'm'),
-    'radius_m': (0.005, 0.1, 'm'),
-    'turns': (0.1, 100.0, 'turns'),
-    'duration_s': (0.1, 60.0, 's'),
+# Of a request: lowest, highest, unit and meaning. A number is the same for every robot; a name is a configurable limit.
+RANGES: Mapping[str, tuple[float | str, float | str, str, str]] = {
+    'speed_m_s': (0.002, 'max_speed_m_s', 'm/s', 'speed along the surface'),
+    'force_n': ('min_force_n', 'max_force_n', 'N', 'force on the surface, newton'),
+    'distance_m': (0.002, MAX_DISTANCE_M, 'm', 'length of a straight slide'),
+    'radius_m': (0.005, 0.1, 'm', 'radius, if the motion has one'),
+    'turns': (0.1, 100.0, 'turns', 'number of turns, if the motion has some'),
+    'duration_s': (0.1, 60.0, 's', 'duration of an in-hand slide'),
 }
 # Limits of which the first must be below the second.
 ORDERED = (
@@ -115,7 +115,7 @@ class SafetyLimits:
 
     def range(self, name: str) -> tuple[float, float, str]:
         """Return lowest and highest allowed value, and unit, of a number of a request."""
-        low, high, unit = RANGES[name]
+        low, high, unit, _ = RANGES[name]
         low, high = (getattr(self, limit) if isinstance(limit, str) else limit for limit in (low, high))
         return low, high, unit
 

@@ -61,7 +61,7 @@ class RigCase:
     units: Mapping[str, str | tuple[str, ...]]
     modulus: int
     line: Line | None  # None if the sensor differs from a listed one by a table alone
-    config: str = ''  # Settings of the sensor, so that it publishes counts
+    config: str = ''  # Settings of the sensor, so that it publishes whole counts (gain 1)
     resting: str = ''  # Topic that the device is not fed with, if there is one
 
     @property
@@ -159,6 +159,7 @@ CASES: Mapping[str, RigCase] = {
 
 DEADLINE_S = 30.0
 STEP_S = 0.003
+MOSTLY = 0.9  # more than byte faults leave
 MAX_AT_ONCE_S = 0.04  # after a stall of the machine the line's buffer must not run over
 
 
@@ -258,6 +259,9 @@ class Rig:
         channels = np.arange(values.shape[1])
         offsets: AnyArray = (values - indices[:, None] - channels) % self.case.modulus
         finite: AnyArray = offsets[np.isfinite(values)]
+        assert np.mean(finite == finite.round()) > MOSTLY, (
+            f"'{self._name}' publishes {values[0, 0]}, which is no count; give RigCase.config a setting for gain 1"
+        )
         return finite
 
     def in_order(self, batch: TactileSignal) -> bool:

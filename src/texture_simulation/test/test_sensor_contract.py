@@ -70,7 +70,7 @@ def test_what_was_sampled_arrives_in_its_place_unit_and_time(make: Make, name: s
     for topic, units in rig.case.units.items():
         batch = topics[topic][-1]
         assert batch.units == (units if isinstance(units, tuple) else (units,) * len(batch.channels))
-        assert topic == rig.case.resting or rig.in_order(batch), f'{topic}: a channel is not in its place'
+        assert topic == rig.case.resting or rig.in_order(batch), f'{topic}: a channel is not in its place, or no count'
     for topic, rate_hz in rig.sensor.expected_rates_hz.items():
         assert {batch.sampling_rate_hz for batch in topics[topic]} == {rate_hz}
         assert all(after.stamp_ns > before.stamp_ns for before, after in pairwise(topics[topic]))

@@ -44,6 +44,7 @@ from texture_core.errors import (
 from texture_core.types import ExplorationRequest, ExplorationState, Rejection, TextureEstimate
 from texture_exploration.motions import MOTIONS
 from texture_exploration.presets import load_preset
+from texture_exploration.safety import RANGES
 
 if TYPE_CHECKING:
     from texture_evaluation import collection
@@ -53,15 +54,11 @@ if TYPE_CHECKING:
 # ruff: noqa: PLC0415
 
 T = TypeVar('T')
-# Option, field of the request, unit, meaning.
-NUMBERS = (
-    ('speed', 'speed_m_s', 'M/S', 'speed along the surface'),
-    ('force', 'force_n', 'NEWTON', 'force on the surface'),
-    ('distance', 'distance_m', 'M', 'length of a straight slide'),
-    ('radius', 'radius_m', 'M', 'radius, if the motion has one'),
-    ('turns', 'turns', 'N', 'turns, if the motion has some'),
-    ('duration', 'duration_s', 'S', 'duration of an in-hand slide'),
-)
+# By field of the request: the option that gives it, without the unit.
+NUMBERS = {
+    field: '--' + field.removesuffix(f'_{unit.replace("/", "_").lower()}').replace('_', '-')
+    for field, (_, _, unit, _) in RANGES.items()
+}
 BAR = 24
 TIMEOUT_S = 300.0
 EXPLORER_S, SOON_S = 5.0, 1.0  # within which an explorer that runs is discovered, at most and usually
@@ -74,9 +71,9 @@ def _configure_explore(parser: argparse.ArgumentParser) -> None:
         '--repeats', type=int, default=0, metavar='N', help='rounds (default: 1, of a preset as it declares)'
     )
     parser.add_argument('--json', action='store_true', help='print each result as one line of JSON')
-    for option, _, unit, meaning in NUMBERS:
+    for field, (_, _, unit, meaning) in RANGES.items():
         shown = f'{meaning}; 0: the default of the motion'
-        parser.add_argument(f'--{option}', type=float, default=0.0, metavar=unit, help=shown)
+        parser.add_argument(NUMBERS[field], dest=field, type=float, default=0.0, metavar=unit.upper(), help=shown)
     parser.add_argument(
         '--direction',
         type=float,
@@ -185,12 +182,13 @@ def print_result(result: ExplorationResult) -> bool:
 def requests_of(options: argparse.Namespace) -> list[ExplorationRequest]:
     """Return the requests given by the options, one for each direction."""
     if bool(options.motion) == bool(options.preset):
-        raise InvalidParameter('give the motion, such as linear_slide, or --preset NAME')
+        came = f"the motion '{options.motion}' and the preset '{options.preset}' came; " * bool(options.preset)
+        raise InvalidParameter(f'{came}give either a motion, such as linear_slide, or --preset NAME')
     if options.repeats < 0:
         raise InvalidParameter(f'--repeats is {options.repeats}; 1 or more rounds are needed')
-    numbers = {field: getattr(options, option) for option, field, _, _ in NUMBERS}
+    numbers = {field: getattr(options, field) for field in NUMBERS}
     if options.preset:
-        given = [f'--{option}' for option, field, _, _ in NUMBERS if numbers[field]]
+        given = [option for field, option in NUMBERS.items() if numbers[field]]
         given += ['--direction'] * (options.direction != [0.0]) + ['--start'] * (options.start is not None)
         if given:
             raise InvalidParameter(

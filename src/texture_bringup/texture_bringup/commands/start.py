@@ -11,13 +11,13 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
 from dataclasses import asdict, fields, is_dataclass
 from difflib import get_close_matches
 from importlib import import_module
 from importlib.util import find_spec
-from multiprocessing import get_context
+from multiprocessing import Pipe, get_context
+from multiprocessing.connection import Connection
 from operator import attrgetter
 from pathlib import Path
 from types import SimpleNamespace
@@ -25,6 +25,7 @@ from typing import Any
 
 from texture_bringup.launcher import (
     EXPLORER,
+    STOPPING_SIGNALS,
     VARIABLE,
     NodeDescription,
     Supervisor,
@@ -41,8 +42,9 @@ from texture_core.config import (
     parameter_sections,
     parameters_of,
     reaches,
+    ros_domain,
 )
-from texture_core.errors import InvalidLaunch, InvalidParameter, LaunchFailed, UnknownName
+from texture_core.errors import InvalidLaunch, InvalidParameter, LaunchFailed, TextureError, UnknownName
 
 # Each command imports what it starts when it runs: a launcher is a child of many programs, and is up sooner without.
 # ruff: noqa: PLC0415
@@ -56,6 +58,7 @@ def _configure_launch(parser: argparse.ArgumentParser) -> None:
 
 def _launch(options: argparse.Namespace) -> int:
     """Run the nodes until they end or Ctrl-C; return 2 if a needed one was started wrongly, 1 if one died, else 0."""
+    ros_domain()
     nodes = read(find_launch_file(options.file), given_arguments(options.arguments), os.environ)
     refuse_wrong(nodes)
     for line in raised_limits(nodes):
@@ -96,14 +99,37 @@ def refuse_wrong(nodes: Sequence[NodeDescription]) -> None:
 
     In a separate process: a launcher that stays needs none of their libraries.
     """
-    # A pool ends only if nothing interrupts the process within it.
-    held = signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM)
-    with ProcessPoolExecutor(1, get_context('fork'), signal.pthread_sigmask, held) as pool:
-        checked = pool.submit(_check, nodes)
+    ours, theirs = Pipe(duplex=False)
+    checking = get_context('fork').Process(target=_answer, args=(theirs, nodes), daemon=True)
+    # In that process for good: this one kills it. Here until it is known.
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, STOPPING_SIGNALS)
+    checking.start()
+    theirs.close()
+    try:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
         with task('checking what the launch was given'):  # behind the fork, which copies no thread
-            pipes = checked.result()
+            pipes = ours.recv()
+    except EOFError as error:
+        raise LaunchFailed(
+            'what checks the arguments has ended without an answer; look at the lines above, and at the free memory'
+        ) from error
+    finally:
+        checking.kill()
+        checking.join()
+    if isinstance(pipes, Exception):
+        raise pipes
     for pipe in pipes:
         claim(Path(pipe).expanduser())
+
+
+def _answer(asked: Connection, nodes: Sequence[NodeDescription]) -> None:
+    """Send what `_check` returns, or the error of the user that it raises."""
+    answer: list[str] | Exception
+    try:
+        answer = _check(nodes)
+    except (TextureError, OSError) as error:
+        answer = error
+    asked.send(answer)
 
 
 def _check(nodes: Sequence[NodeDescription]) -> list[str]:

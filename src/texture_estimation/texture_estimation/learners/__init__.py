@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What learns textures, one a file; `catalogue` lists them."""
+"""What learns textures, one a file; `recipe` lists them."""

@@ -219,12 +219,14 @@ class ExplorerNode(PatientLifecycleNode):
         self._explorer.release()
 
     def _tried(self, step: Callable[[], object]) -> bool:
-        """Return whether the arm allowed it; if not, log why."""
+        """Return whether the arm allowed it; if not, log why: a warning while both may start."""
         try:
             step()
         except TextureError as error:
-            if not ENDING.is_set():  # a wait that Ctrl-C ended is no fault
-                self.get_logger().error(f'{error}{"; the next request tries again" * self._autostart}')
+            if self._autostart and not ENDING.is_set():  # a wait that Ctrl-C ended is no fault
+                self.get_logger().warning(f'{error}; the next request tries again')
+            elif not ENDING.is_set():
+                self.get_logger().error(str(error))
             return False
         return True
 
@@ -303,8 +305,7 @@ class ExplorerNode(PatientLifecycleNode):
             result.error_code, result.message = int(refusal(error)), str(error)
             result.field = 'motion' if isinstance(error, UnknownName) else error.field
             # Their numbers are NaN, not the zeros that a new message holds.
-            nothing = no_estimates('')
-            result.texture, result.roughness = to_msg(nothing['texture']), to_msg(nothing['roughness'])
+            result.texture, result.roughness = map(to_msg, no_estimates('').values())
             self.get_logger().warning(f'refused: {error}')
             return result
         estimates = self._open[exploration.exploration_id] = no_estimates(exploration.exploration_id)
@@ -404,9 +405,8 @@ class ExplorerNode(PatientLifecycleNode):
             return
         estimates['texture' if isinstance(estimate, TextureEstimate) else 'roughness'] = estimate
         current = self._explorer.current
-        if current is None or current.exploration_id != estimate.exploration_id or not current.request.early_stopping:
-            return
-        if isinstance(estimate, TextureEstimate) and may_stop(estimate):
+        early = current and current.exploration_id == estimate.exploration_id and current.request.early_stopping
+        if early and isinstance(estimate, TextureEstimate) and may_stop(estimate):
             current.finish(
                 f"ended early: '{estimate.label}' is decided with {estimate.confidence:.2f} "
                 f'after {estimate.evidence_s:.1f} s of evidence'
