@@ -79,7 +79,7 @@ for name in sys.argv[2:]:
 OPTIONAL = {
     'texture_recordings': {
         'python3-scipy': {'public_sets', 'readers'},
-        'texture_features': {'commands.convert', 'dataset', 'segment'},
+        'texture_features': {'commands.convert', 'dataset'},
     }
 }
 # What launch files need, which no module imports.

@@ -7,7 +7,7 @@ from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.types import Phase
 from texture_features.segmentation import SegmentationParams
 from texture_recordings.bags import BagWriter, read_bag
-from texture_recordings.segment import segment_bags
+from texture_recordings.commands.convert import segment_bags
 from texture_recordings.slides import find_slides
 from texture_simulation.offline import SlidePlan, write_simulated
 

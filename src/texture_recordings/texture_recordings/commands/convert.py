@@ -7,21 +7,24 @@ from __future__ import annotations
 import argparse
 import re
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from texture_core.cli import Command, add_bag_namespace, add_parameters, add_slides, parameters_from, task
+from texture_core.cli import Command, add_bag_namespace, add_parameters, add_slides, parameters_from, progress, task
 from texture_core.config import find
-from texture_core.errors import InvalidParameter, counted
-from texture_features.segmentation import SegmentationParams
+from texture_core.errors import InvalidData, InvalidParameter, counted
+from texture_core.types import Phase, TactileSignal
+from texture_features.segmentation import SegmentationParams, segment_recording
+from texture_recordings.bags import EXPLORATION, BagPaths, BagWriter, find_bags, new_folder, read_bag, read_named
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.export import export_slides
 from texture_recordings.mapping import load_mapping
 from texture_recordings.public_sets import IMPORTS
 from texture_recordings.readers import MAPPED
-from texture_recordings.segment import segment_bags
 from texture_recordings.tables import import_tables
 
+FAST_TOPIC = 'signal'
 USAGE = 'texture import DATA_SET SOURCE OUT, or texture import {table,bag} MAPPING SOURCE OUT'
 
 
@@ -64,6 +67,46 @@ def _import_mapped(options: argparse.Namespace) -> list[Path]:
             'separate field in `files` of the mapping, such as {material}_{run:d}'
         )
     return report.bags
+
+
+def segment_bags(
+    bags: BagPaths, out: Path, params: SegmentationParams, surface: str, namespace: str | None = None
+) -> dict[Path, int]:
+    """Copy bags, their exploration states replaced by those found in the signals; return the slides in each copy.
+
+    All other messages are copied as they are. InvalidData if a bag has slides already.
+    """
+    paths = find_bags(bags)
+    with new_folder(out):
+        return {
+            out / path.name: _with_slides(path, out / path.name, params, surface, namespace)
+            for path in progress(paths, 'segmenting bags', len(paths))
+        }
+
+
+def _with_slides(path: Path, out: Path, params: SegmentationParams, surface: str, namespace: str | None) -> int:
+    signals: list[TactileSignal] = []
+    for topic, _, value in read_bag(path, (FAST_TOPIC, EXPLORATION), namespace):
+        if topic == FAST_TOPIC:
+            signals.append(value)
+        elif value.phase is Phase.SLIDE:
+            raise InvalidData(
+                f"the bag '{path}' has slides already, the first over '{value.surface}'; use it as it is, and give "
+                'only bags without exploration states here'
+            )
+    if not signals:
+        raise InvalidData(f"the bag '{path}' has no '{FAST_TOPIC}' to find slides in; also record the vibration")
+    states = segment_recording(signals, params, exploration_id=path.name)
+    with BagWriter(out) as bag:
+        prefix = ''
+        for name, message in read_named(path, namespace):
+            if name != EXPLORATION:
+                bag.write_raw(message)
+            if message.topic != '/diagnostics':
+                prefix = message.topic.removesuffix(f'/{name}')
+        for state in states:
+            bag.write(f'{prefix}/{EXPLORATION}', replace(state, surface=surface), state.stamp_ns)
+    return sum(state.phase is Phase.SLIDE for state in states)
 
 
 def _configure_segment(parser: argparse.ArgumentParser) -> None:
