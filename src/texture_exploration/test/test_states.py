@@ -124,7 +124,7 @@ def values():
         'frozen_force_s': f'{limits.frozen_force_s:g} s',
         'force_drift_fraction': f'{100 * limits.force_drift_fraction:g} %',
         'OVERSHOOT': f'{100 * watches.OVERSHOOT:g} % above the requested',
-        'HARD, LATE_S': f'{force_control.HARD:g} × that of the impact as declared; '
+        'HARD, LATE_S': f'{force_control.HARD:g} × the impact at `max_stiffness_n_m`; '
         f'{1e3 * force_control.LATE_S:g} ms late',
         'peak_force_fraction': f'{100 * touching.peak_force_fraction:g} % above the requested',
         'peak_speed_fraction': f'{100 * touching.peak_speed_fraction:g} % above the requested',
