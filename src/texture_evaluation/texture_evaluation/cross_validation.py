@@ -23,7 +23,7 @@ from threadpoolctl import threadpool_limits
 
 from texture_core.cli import progress
 from texture_core.config import library, unknown_name
-from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.errors import InvalidData, InvalidParameter, counted
 from texture_core.types import AnyArray, Array
 from texture_estimation.evidence import EvidenceAccumulator, single_decisions
 from texture_estimation.model import TextureModel
@@ -596,7 +596,7 @@ def _check_folds(labels: AnyArray, folds: int) -> None:
     names, counts = np.unique(labels, return_counts=True)
     if counts.min() < folds:
         raise InvalidData(
-            f"'{names[counts.argmin()]}' has {counts.min()} slides, too few for {folds} folds; "
+            f"'{names[counts.argmin()]}' has {counted(int(counts.min()), 'slide')}, too few for {folds} folds; "
             'use fewer folds or record more slides'
         )
 

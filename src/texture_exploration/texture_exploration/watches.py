@@ -228,6 +228,6 @@ class OvershootWatch:
             raise MotionAborted(
                 f'the force reached {reached_n:.2f} N of {self._force_n:.3g} N requested before the slide; the contact '
                 "is stiffer than 'max_stiffness_n_m' or 'approach_stiffness_n_m', or arm or force later than "
-                "'loop_delay_s'",
+                "'loop_delay_s', as with a busy computer",
                 ExplorationError.FORCE_LIMIT,
             )
