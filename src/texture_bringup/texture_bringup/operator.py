@@ -158,6 +158,7 @@ STOP_S = 3.0
 CHOOSE = 'choose its namespace by --namespace, also of `texture dashboard`'
 EMERGENCY = 'if the arm moves, use the emergency stop of the robot'
 NOT_STOPPED = f'the explorer has not answered the stop within {STOP_S:g} s; {EMERGENCY}'
+TOGETHER_S = 0.2  # between the discovery of two explorers that run
 SETTINGS_S = 10.0  # to find the parameters of a node
 RETRY_PERIOD_S = 5.0
 # What this process has discovered, the others discover soon after.
@@ -259,13 +260,22 @@ class Operator:
         except KeyboardInterrupt:
             raise KeyboardInterrupt('nothing was requested') from None
         except LaunchFailed as error:
-            nodes = self._node.get_node_names_and_namespaces()
-            others = ', '.join(sorted(space for name, space in nodes if name == 'explorer' and space != ours))
+            others = ', '.join(sorted(space for space in self._explorers() if space != ours))
             if not others:
                 raise
             raise LaunchFailed(
                 f'{missing} (waited {deadline_s:.0f} s); there are explorers in {others}: {CHOOSE}'
             ) from error
+        several = (
+            f'several explorers are in the ROS_DOMAIN_ID {self._domain_id} and namespace {ours}; a request would move '
+            'all their arms: end the others, or give each a namespace. ROS forgets one that was killed after 20 s'
+        )
+        found_s = time.monotonic() + TOGETHER_S
+        self.wait_until(lambda: time.monotonic() > found_s and self._explorers().count(ours) < 2, deadline_s, several)
+
+    def _explorers(self) -> list[str]:
+        """Return the namespace of each explorer that is there."""
+        return [space for name, space in self._node.get_node_names_and_namespaces() if name == 'explorer']
 
     def wait_for_node(self, name: str, deadline_s: float) -> None:
         """Wait until a node of the namespace is there."""

@@ -112,6 +112,7 @@ def test_each_signal_of_a_mapping_is_watched_alone_and_announced_with_all_others
         log.append(capfd.readouterr().err)
         return text in ''.join(log)
 
+    signals = graph.listen(msg.TactileSignal, 'signal', SENSOR_QOS)
     # Neither a silent signal nor one that does not fit the mapping is announced with the other.
     graph.until(lambda: logs("no message on '/slow' yet; start the driver, or correct topic and type", fast=[1]))
     graph.until(lambda: logs("on '/slow' the message holds 3 numbers; 2 are needed", fast=[1], slow=[1, 2]))
@@ -123,6 +124,7 @@ def test_each_signal_of_a_mapping_is_watched_alone_and_announced_with_all_others
         assert reports[-1].status[0].level == DiagnosticStatus.ERROR
         assert not logs('the sensor delivers samples')
     graph.until(lambda: logs('the sensor delivers samples', fast=[1], slow=[1]))
+    assert {signal.sensor for signal in signals} == {'two/signal'}  # wherever the file lies
     other = graph.peer.create_publisher(msg.TactileSignal, 'signal', SENSOR_QOS)
     graph.until(
         lambda: logs('', fast=[1], slow=[1]) and "another node publishes on '/signal'" in reports[-1].status[0].message

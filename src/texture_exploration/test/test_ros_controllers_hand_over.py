@@ -9,6 +9,7 @@ import socket
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -163,6 +164,16 @@ def test_a_controller_that_would_go_on_for_ever_is_refused_unless_that_is_accept
     monkeypatch.setattr(controller_topics, 'scope', tuple)
     with pytest.raises(DeviceError, match=message):
         RosControllersArm(RosControllersParams(**accepted)).connect()
+
+
+def test_a_second_controller_on_the_topics_of_the_arm_is_refused_as_beside_an_emulated_one(graph):
+    places = graph.listen(PoseStamped, 'tcp_pose_broadcaster/pose')
+    with NodeProcess('texture_simulation', 'twist_controller', HELD):
+        graph.until(lambda: places)
+        second = graph.peer.create_publisher(PoseStamped, 'tcp_pose_broadcaster/pose', 1)
+        with pytest.raises(DeviceError, match=r"too much: .* and .* publish on 'tcp_pose_broadcaster/pose'; end it"):
+            RosControllersArm(replace(PATIENT, connect_timeout_s=4.0)).connect()
+        graph.peer.destroy_publisher(second)
 
 
 @pytest.mark.parametrize('range_', ['LOCALHOST', 'SUBNET'])

@@ -8,6 +8,7 @@ import importlib
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from rclpy.executors import SingleThreadedExecutor
@@ -64,7 +65,7 @@ class Adaptor(Node):
         frame_id = frame_name(self.get_namespace(), params.frame_id)
         mapping, self._messages = load_messages(params.mapping, params.finger)
         self._adaptors = {
-            name: SignalAdaptor(f'{params.mapping}/{name}', signal, frame_id)
+            name: SignalAdaptor(f'{Path(params.mapping).stem}/{name}', signal, frame_id)
             for name, signal in mapping.signals.items()
         }
         self._publishers_of = {

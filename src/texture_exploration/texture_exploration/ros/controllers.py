@@ -178,10 +178,15 @@ class RosTopics:
             time.sleep(LOOKING_S)
 
     def _other_commander(self, *ours: str) -> str:
-        """Return in a sentence another commander, '' if there is none; `ours` are the participants of this explorer."""
+        """Return in a sentence another commander or controller, '' if there is none; `ours` are our participants."""
         for info in self._node.get_publishers_info_by_topic(self._topic):
             if sender(info) not in ours:
                 return f"{node_of(info)} also commands the arm: it publishes on '{self._topic}'"
+        for measured in (self._params.pose_topic, self._params.wrench_topic):
+            found = self._node.get_publishers_info_by_topic(self._node.resolve_topic_name(measured))
+            if len(found) > 1:
+                both = ' and '.join(sorted(map(node_of, found)))
+                return f"a real or emulated controller too much: {both} publish on '{measured}'"
         return ''
 
     def close(self) -> None:
