@@ -23,6 +23,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from functools import cache, partial
 from importlib.metadata import EntryPoint, entry_points, version
+from io import TextIOWrapper
 from typing import cast
 
 from texture_core.cli import INTERRUPTED, Command, Parser, run_program, show_progress, task
@@ -78,6 +79,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def program() -> int:
     """Run the command as a process, which shuts down in order when it is asked to stop."""
+    for stream in (sys.stdout, sys.stderr):  # an encoding may lack a letter
+        cast(TextIOWrapper, stream).reconfigure(errors='backslashreplace')
     # Also where a shell has started the command in the background and made it ignore Ctrl-C.
     stopping = [signal.SIGINT, signal.SIGTERM]
     if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # closed terminal; ignored under nohup

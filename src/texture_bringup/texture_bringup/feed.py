@@ -326,6 +326,11 @@ class Feed:
         """Return the newest state and estimates of the present exploration."""
         return self._state, self._texture, self._roughness
 
+    @property
+    def senses(self) -> bool:
+        """Whether samples have come."""
+        return self._ring.last is not None
+
     def frame(self, time_s: float) -> dict[str, Any]:
         """Return everything that is shown at a time of the monotonic clock, s, as JSON can carry it."""
         self._began_s = min(self._began_s, time_s)

@@ -77,8 +77,9 @@ def look_up(catalogue: Mapping[str, T], name: str, kind: str) -> T:
 def unknown_name(name: str, known: Iterable[str], kind: str, most: int = MOST_NAMES) -> UnknownName:
     """Return the error for a name that is not among the known ones, with the nearest of them."""
     names = sorted(known)
-    near = difflib.get_close_matches(name, names, n=1)
-    hint = f"; did you mean '{near[0]}'?" if near else '.'
+    bare = {one.lstrip('-'): one for one in names}  # dashes make all options alike
+    near = difflib.get_close_matches(name.lstrip('-'), bare, n=1)
+    hint = f"; did you mean '{bare[near[0]]}'?" if near else '.'
     more = f', … ({len(names)})' if len(names) > most else ''
     return UnknownName(f"no {kind} '{name}'{hint} Known: {', '.join(names[:most]) or 'none'}{more}")
 

@@ -134,7 +134,7 @@ CLOCKS: dict[str, tuple[Write, dict, Truth]] = {
     'runs by pause': (csv(np.r_[T[:100], T[:500]], X), PAUSE, [('cork', X[:100]), ('cork', X[100:])]),
     'a run of few rows by pause': (csv(np.r_[T[:590], T[:10]], X), PAUSE, [('cork', X[:590]), ('cork', X[590:])]),
     'a pause': (csv(np.r_[T[:100], 3 + T[:500]], X), PAUSE, [('cork', X[:100]), ('cork', X[100:])]),
-    'ms that are called s': (csv(1e3 * T, X), {}, r'0\.1 Hz by its times; with unit: ms it were 100 Hz'),
+    'ms that are called s': (csv(1e3 * T, X), {}, r'0\.1 Hz by its times; with unit: ms it would be 100 Hz'),
     'us that are called ms': (csv(1e6 * T, X), timed('ms'), 'rate of .* with unit: us'),
     'ms that are called s at 8 kHz': (
         csv((T / 80 * 1e3).round(6), X), {'conditions': {'speed': {'value': '1'}}},
@@ -158,7 +158,13 @@ CLOCKS: dict[str, tuple[Write, dict, Truth]] = {
     ),
     'a force in gf': (csv(T, X), {'conditions': {'force': {'value': '150'}}}, 'force .* 150 N.* may be mN or gf'),
     'degrees': (csv(T, X), {'conditions': {'direction': {'value': '90'}}}, 'direction of .* 90 rad.* may be deg'),
-    'a slide of hours': (csv(X, names='x'), {'streams': {'signal': {'columns': ['x'], 'rate_hz': 0.05}}}, 'lasts 1.2e'),
+    'a slide of hours': (
+        csv(np.random.default_rng(3).normal(size=9600).round(4), names='x'),
+        {'streams': {'signal': {'columns': ['x'], 'rate_hz': 5}}}, 'lasts 1[.]?92',
+    ),
+    'a rate below all': (
+        csv(X, names='x'), {'streams': {'signal': {'columns': ['x'], 'rate_hz': 2}}}, '2 Hz by the mapping',
+    ),
     'rate changes': (
         csv(np.r_[T[:300], 3 + np.arange(300) / 125], X), {},
         'the rate changes within a slide: by 111.1 Hz this row is 17.5 samples off',

@@ -572,10 +572,12 @@ class FrameSlides:
                 'mapping, and give each rate another one'
             )
         low, high = PLAUSIBLE_HZ
-        if not params.rate_hz and not low <= rate_hz <= high:
-            likely = [f'; with unit: {one} it were {rate_hz / factor:g} Hz' for one, factor in _units(params, rate_hz)]
+        if not low <= rate_hz <= high:
+            by = 'the mapping' if params.rate_hz else 'its times'
+            units = () if params.rate_hz else _units(params, rate_hz)
+            likely = [f'; with unit: {one} it would be {rate_hz / factor:g} Hz' for one, factor in units]
             raise InvalidData(
-                f"the rate of '{name}' is {rate_hz:g} Hz by its times{''.join(likely[:1])}; give a column of time that "
+                f"the rate of '{name}' is {rate_hz:g} Hz by {by}{''.join(likely[:1])}; give a column of time that "
                 f'grows and its unit, or `rate_hz`, from {low:g} to {high:g}'
             )
         self._report.rates_hz[name] = rate_hz

@@ -263,8 +263,6 @@ def claim(pipe: Path) -> None:
 def _say(line: str) -> None:
     try:
         print(f'{line}\n', end='', flush=True)  # in one piece: nodes write at the same time
-    except UnicodeEncodeError:  # the encoding of the output lacks a letter
-        _say(ascii(line))
     except OSError:
         # Who read along has gone, or the disk is full: nothing more can be shown, and the nodes are stopped in good
         # order. Not raised: the output of a node must be read to its end, or the node stands still.

@@ -117,13 +117,13 @@ def bar(fraction: float, style: str) -> Text:
 
 
 def _lines(feed: Feed) -> Callable[[], None]:
-    """Return a function that prints the newest frame if its phase or its estimate has changed."""
+    """Return a function that prints the newest frame if its phase or its estimate has changed, or samples have come."""
     last: tuple[Any, ...] = ()
 
     def show() -> None:
         nonlocal last
         state, texture, grade = feed.newest()
-        key = state.exploration_id, state.phase, texture.label, texture.rejection, grade.valid
+        key = state.exploration_id, state.phase, texture.label, texture.rejection, grade.valid, feed.senses
         if key != last:
             last = key
             print(line(feed.frame(time.monotonic())), flush=True)
