@@ -107,7 +107,7 @@ def test_each_slide_has_its_conditions(condition: str, expected: list) -> None:
     [
         (({'signal': arrays()[:5]}, LABELS, {'signal': RATE_HZ}), "'signal' has 5 slides"),
         (({'signal': arrays()}, LABELS, {}), 'the rates are {}; give one array'),
-        (({'signal': arrays()}, LABELS, 1000.0), 'the rates are 1000.0; give one array'),
+        (({'signal': arrays()}, LABELS, 1000.0), 'signals and rates_hz are by topic'),
         (({'signal': arrays()}, 'corkfe', {'signal': RATE_HZ}), 'has 6 slides for 1 labels'),
         (({'signal': arrays()}, [*LABELS[:5], ' '], {'signal': RATE_HZ}), 'slide 6 has an empty label'),
         (({'signal': arrays()}, ['a/b', *LABELS[1:]], {'signal': RATE_HZ}), "the label 'a/b' has a slash"),

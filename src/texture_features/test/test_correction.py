@@ -116,6 +116,9 @@ def test_slides_that_prove_nothing_are_refused_with_what_to_do():
 def test_files_next_to_a_model_are_read_back_or_refused(tmp_path):
     model = tmp_path / 'cloths.npz'
     assert read_correction(model) is None
+    with pytest.raises(ModelMismatch, match='there is no model'):
+        read_reference(model)
+    model.with_suffix('.json').write_text('{}')
     with pytest.raises(ModelMismatch, match=r'no reference is stored.*--store'):
         read_reference(model)
     reference = found(slide())

@@ -296,8 +296,10 @@ def read_reference(model: str | Path) -> tuple[dict[str, InputStatistics], dict[
     """
     path = file_next_to(model, REFERENCE)
     if not path.exists():
+        if not path.with_name(path.name.replace(f'.{REFERENCE}', '')).exists():
+            raise ModelMismatch(f"there is no model '{model}'; give the path of a trained one")
         raise ModelMismatch(
-            f"no reference is stored: '{path}' does not exist; if that is the model, slide over the reference plate "
+            f"no reference is stored: '{path}' does not exist; slide over the reference plate "
             f'with the finger that it was trained with, and store that slide by `texture check {model} --store`'
         )
     try:

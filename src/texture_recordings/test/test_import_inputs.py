@@ -162,6 +162,7 @@ CLOCKS: dict[str, tuple[Write, dict, Truth]] = {
         csv(np.random.default_rng(3).normal(size=9600).round(4), names='x'),
         {'streams': {'signal': {'columns': ['x'], 'rate_hz': 5}}}, 'lasts 1[.]?92',
     ),
+    'an open brace': (csv(T, X), {'files': '{material}_{run.csv'}, "has a '{' that belongs to no field"),
     'a rate below all': (
         csv(X, names='x'), {'streams': {'signal': {'columns': ['x'], 'rate_hz': 2}}}, '2 Hz by the mapping',
     ),

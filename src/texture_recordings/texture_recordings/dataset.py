@@ -160,12 +160,14 @@ class SlideDataset:
             If the numbers of slides or channels contradict each other, or an array, a label or a condition is none
             that an import takes.
         """
+        if not (isinstance(signals, Mapping) and isinstance(rates_hz, Mapping)):
+            raise InvalidData("signals and rates_hz are by topic: {'signal': [...]} and {'signal': 1000.0}")
         surfaces = [checked_label(str(label)) for label in ([labels] if isinstance(labels, str) else labels)]
         if not all(surfaces):
             raise InvalidData(f'slide {surfaces.index("") + 1} has an empty label; give the surface of each')
         count = len(surfaces)
         for topic, arrays in signals.items():
-            if len(arrays) != count or not isinstance(rates_hz, Mapping) or topic not in rates_hz:
+            if len(arrays) != count or topic not in rates_hz:
                 raise InvalidData(
                     f"'{topic}' has {len(arrays)} slides for {count} labels, and the rates are {rates_hz}; give one "
                     "array (n_samples, n_channels) for each label, and the rate of each topic, such as {'signal': 2e3}"

@@ -23,6 +23,8 @@ def template_fields(template: str, name: str) -> dict[str, str] | None:
     A field in braces is one character or more without '/', `{run:d}` digits alone, '*' and '{}' any text that is not
     kept.
     """
+    if rest := re.search('[{}]', FIELD.sub('', template)):
+        raise InvalidData(f"'{template}' has a '{rest[0]}' that belongs to no field; write {{material}} or {{run:d}}")
     # If fields that are as long as can be and such that are as short as can be are the same, there is but one way.
     found = []
     for most in ('', '?'):

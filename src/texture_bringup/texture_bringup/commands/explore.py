@@ -67,9 +67,7 @@ EXPLORER_S, SOON_S = 5.0, 1.0  # within which an explorer that runs is discovere
 def _configure_explore(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('motion', nargs='?', default='', help=f'how to move: {", ".join(MOTIONS)}')
     parser.add_argument('--preset', metavar='NAME', help='make all motions of a preset instead, such as ets-linear')
-    parser.add_argument(
-        '--repeats', type=int, default=0, metavar='N', help='rounds (default: 1, of a preset as it declares)'
-    )
+    parser.add_argument('--repeats', type=int, metavar='N', help='rounds (default: 1, of a preset as it declares)')
     parser.add_argument('--json', action='store_true', help='print each result as one line of JSON')
     for field, (_, _, unit, meaning) in RANGES.items():
         shown = f'{meaning}; 0: the default of the motion'
@@ -98,7 +96,7 @@ def _configure_explore(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=TIMEOUT_S,
         help='longest duration of one exploration, s; then the finger is lifted and the exploration aborted '
-        '(default: %(default)g)',
+        '(default: %(default)g; 0: none)',
     )
     add_namespace(parser)
 
@@ -184,7 +182,7 @@ def requests_of(options: argparse.Namespace) -> list[ExplorationRequest]:
     if bool(options.motion) == bool(options.preset):
         came = f"the motion '{options.motion}' and the preset '{options.preset}' came; " * bool(options.preset)
         raise InvalidParameter(f'{came}give either a motion, such as linear_slide, or --preset NAME')
-    if options.repeats < 0:
+    if options.repeats is not None and options.repeats < 1:
         raise InvalidParameter(f'--repeats is {options.repeats}; 1 or more rounds are needed')
     numbers = {field: getattr(options, field) for field in NUMBERS}
     if options.preset:
@@ -195,7 +193,7 @@ def requests_of(options: argparse.Namespace) -> list[ExplorationRequest]:
                 f'{", ".join(given)} came with --preset, whose motions have their own values; leave that out, or give '
                 'a motion instead of the preset'
             )
-        made = load_preset(options.preset, options.repeats)
+        made = load_preset(options.preset, options.repeats or 0)
         early, timeout_s = options.early_stopping, options.timeout
         return [
             replace(one, surface=options.surface, early_stopping=early, timeout_s=one.timeout_s or timeout_s)
@@ -214,7 +212,7 @@ def requests_of(options: argparse.Namespace) -> list[ExplorationRequest]:
         **numbers,
     )
     slides = [replace(request, direction_rad=math.radians(direction)) for direction in options.direction]
-    return slides * max(options.repeats, 1)
+    return slides * (options.repeats or 1)
 
 
 def show_progress(state: ExplorationState, texture: TextureEstimate) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import TYPE_CHECKING
 
 from texture_core.cli import add_bag_namespace, add_slides, task
@@ -71,6 +72,10 @@ def _check_place(out: Path, *, replace: bool) -> None:
         )
     if not file.parent.is_dir():
         raise InvalidParameter(f"there is no folder '{file.parent}' for the model; make it, or name another")
+    try:
+        TemporaryFile(dir=file.parent).close()
+    except OSError as error:
+        raise InvalidParameter(f"'{file}' cannot be written: {error.strerror}; name another folder") from error
 
 
 def summary(model: TextureModel, out: Path) -> list[str]:
