@@ -78,7 +78,7 @@ def test_slides_in_several_directions_end_with_the_first_that_fails(monkeypatch,
     assert '2 of 4 slides were made\n' in capsys.readouterr().err
 
 
-def test_what_was_asked_for_beside_a_preset_reaches_each_of_its_motions(monkeypatch):
+def test_surface_timeout_and_early_stopping_apply_to_each_motion_of_a_preset(monkeypatch):
     nothing = TextureEstimate(0, ''), RoughnessEstimate(0, '')
     made = ExplorationResult(ExplorationError.NONE, 'the motion was completed', 'one', *nothing)
     operator = MagicMock()

@@ -391,7 +391,7 @@ def test_times_that_stand_still_are_a_fault_and_those_of_a_clock_that_was_set_ba
     assert (adaptor.rate_hz, adaptor.fault) == (100.0, '')
 
 
-def test_times_that_are_far_apart_as_of_a_stamp_in_another_unit_are_a_fault() -> None:
+def test_stamps_in_another_unit_are_reported_as_a_fault() -> None:
     adaptor, make = wrenches(), CASES['wrench', 'signal'][0]
     fed(adaptor, make, range(3), 10_000 * MS)
     assert "times of the messages on 'wrench' are more than 0.5 s apart; correct `stamp`" in adaptor.fault
@@ -422,7 +422,7 @@ def test_a_rate_that_is_set_and_wrong_is_a_fault_and_one_that_cannot_be_measured
     ],
     ids=['bursts of neighbours', 'random', 'half the rate', 'twice the rate'],
 )
-def test_lost_messages_are_told_from_a_wrong_rate_by_the_times_of_neighbours(sent: Any, advice: str) -> None:
+def test_lost_messages_are_distinguished_from_a_wrong_rate_by_the_sample_period(sent: Any, advice: str) -> None:
     adaptor = wrenches(rate_hz=200.0)
     fed(adaptor, CASES['wrench', 'signal'][0], sent, 5 * MS)
     assert f'are not published; {advice}' in adaptor.fault

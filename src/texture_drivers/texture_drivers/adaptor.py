@@ -263,7 +263,7 @@ class SignalAdaptor:
         self._placed: list[tuple[int, Array]] = []
         self._last_number: int | None = None
         self._came_ns = 0  # time of the newest message
-        self._apart = False  # whether a silence was before it
+        self._after_silence = False  # whether it came after a silence
         self._known = bool(mapping.rate_hz)  # whether there is a rate with which messages are compared
         self._start()
 
@@ -328,13 +328,13 @@ class SignalAdaptor:
 
     def _measure(self, samples: int, at_ns: int) -> None:
         """Measure the rate, anew after a silence; what is measured later is compared with it."""
-        was_apart, self._apart = self._apart, abs(at_ns - self._came_ns) > SILENCE_NS
-        if self._apart:
-            apart = (
+        repeated, self._after_silence = self._after_silence, abs(at_ns - self._came_ns) > SILENCE_NS
+        if self._after_silence:
+            fault = (
                 f"the times of the messages on '{self.mapping.topic}' are more than 0.5 s apart; correct `stamp` in "
                 'the mapping, or let the driver send more often'
             )
-            self.fault = apart if was_apart else ''
+            self.fault = fault if repeated else ''
             self._meter, self.measured = PeriodMeter(), False
             self._known = bool(self.mapping.rate_hz)
         self._came_ns = at_ns

@@ -211,7 +211,7 @@ def test_impossible_splits_are_refused_with_a_sentence(splitter: object, groups:
         cross_validate(RECIPE, tones(), splitter, groups=groups)
 
 
-def test_slides_without_force_or_speed_are_told_from_other_values_that_are_not_finite() -> None:
+def test_a_missing_force_or_speed_is_distinguished_from_other_values_that_are_not_finite() -> None:
     signals = {'signal': [np.random.default_rng(0).normal(size=(600, 1)) for _ in range(6)]}
     for recipe, given, lacking in (('any-place', 'speed_m_s', 'force'), ('any-speed', 'force_n', 'speed')):
         dataset = SlideDataset.from_arrays(signals, ['cork', 'felt'] * 3, {'signal': 1000.0}, **{given: 0.5})

@@ -154,9 +154,12 @@ def interval(counts: Array, clusters: Sequence[str] | AnyArray | None = None) ->
     counts = counts if clusters is None else clustered(counts, clusters)
     counts = counts[counts[:, 1] > 0]
     right, answers = counts.sum(axis=0)
-    shown = float((1.0 - CONFIDENCE) ** (1.0 / len(counts)))  # the least fraction of clusters of a kind that was shown
+    accuracy = float(right / answers)
+    bound = float(
+        (1.0 - CONFIDENCE) ** (1.0 / len(counts))
+    )  # lower bound of the fraction of clusters like those tested
     low, high = _edges(_resampled(counts))
-    return [min(low, float(right / answers) * shown), max(high, 1.0 - (1.0 - float(right / answers)) * shown)]
+    return [min(low, accuracy * bound), max(high, 1.0 - (1.0 - accuracy) * bound)]
 
 
 def clustered(counts: Array, clusters: Sequence[str] | AnyArray) -> Array:

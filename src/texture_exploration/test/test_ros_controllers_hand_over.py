@@ -166,12 +166,14 @@ def test_a_controller_that_would_go_on_for_ever_is_refused_unless_that_is_accept
         RosControllersArm(RosControllersParams(**accepted)).connect()
 
 
-def test_a_second_controller_on_the_topics_of_the_arm_is_refused_as_beside_an_emulated_one(graph):
+def test_an_arm_whose_pose_two_controllers_publish_is_refused(graph):
     places = graph.listen(PoseStamped, 'tcp_pose_broadcaster/pose')
     with NodeProcess('texture_simulation', 'twist_controller', HELD):
         graph.until(lambda: places)
         second = graph.peer.create_publisher(PoseStamped, 'tcp_pose_broadcaster/pose', 1)
-        with pytest.raises(DeviceError, match=r"too much: .* and .* publish on 'tcp_pose_broadcaster/pose'; end it"):
+        with pytest.raises(
+            DeviceError, match=r"controllers publish on 'tcp_pose_broadcaster/pose': .* and .*, such as .*; end it"
+        ):
             RosControllersArm(replace(PATIENT, connect_timeout_s=4.0)).connect()
         graph.peer.destroy_publisher(second)
 

@@ -296,7 +296,7 @@ def read_reference(model: str | Path) -> tuple[dict[str, InputStatistics], dict[
     """
     path = file_next_to(model, REFERENCE)
     if not path.exists():
-        if not path.with_name(path.name.replace(f'.{REFERENCE}', '')).exists():
+        if not path.with_name(f'{path.name.removesuffix(f".{REFERENCE}.json")}.json').exists():
             raise ModelMismatch(f"there is no model '{model}'; give the path of a trained one")
         raise ModelMismatch(
             f"no reference is stored: '{path}' does not exist; slide over the reference plate "

@@ -183,10 +183,10 @@ class RosTopics:
             if sender(info) not in ours:
                 return f"{node_of(info)} also commands the arm: it publishes on '{self._topic}'"
         for measured in (self._params.pose_topic, self._params.wrench_topic):
-            found = self._node.get_publishers_info_by_topic(self._node.resolve_topic_name(measured))
+            found = self._node.get_publishers_info_by_topic(measured)
             if len(found) > 1:
-                both = ' and '.join(sorted(map(node_of, found)))
-                return f"a real or emulated controller too much: {both} publish on '{measured}'"
+                names = ' and '.join(sorted(map(node_of, found)))
+                return f"several controllers publish on '{measured}': {names}, such as an emulated and a real one"
         return ''
 
     def close(self) -> None:
