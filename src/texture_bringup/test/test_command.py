@@ -118,10 +118,36 @@ def ran(setting: str, *before: str, **environment: str) -> tuple[int, str]:
     return done.returncode, done.stderr
 
 
-@pytest.mark.parametrize(('before', 'end'), [([], (130, 'texture: interrupted\n')), (['nohup'], (0, ''))])
+NOTHING = 'texture: interrupted; nothing was requested\n'
+
+
+@pytest.mark.parametrize(('before', 'end'), [([], (130, NOTHING)), (['nohup'], (0, ''))])
 def test_a_closed_terminal_interrupts_a_command_unless_it_runs_under_nohup(before, end):
     closed = 'lambda: command.run_program(lambda: signal.raise_signal(signal.SIGHUP) or 0)'
     assert ran(f'command.main = {closed}', *before) == end
+
+
+HIDES = """
+class Library:
+    def load(self):
+        try:
+            signal.raise_signal(signal.{})
+        except KeyboardInterrupt:
+            raise ImportError('the extension is not there')
+command.installed = lambda: {{'explore': Library()}}
+sys.argv[1:] = ['explore']"""
+DONE = """
+from types import SimpleNamespace
+module = SimpleNamespace(configure=lambda _: None, run=lambda _: signal.raise_signal(signal.{}))
+command.summary = lambda _: ''
+command.installed = lambda: {{'explore': SimpleNamespace(load=lambda: module)}}
+sys.argv[1:] = ['explore']"""
+
+
+@pytest.mark.parametrize('number', ['SIGINT', 'SIGTERM', 'SIGHUP'])
+@pytest.mark.parametrize(('library', 'said'), [(HIDES, NOTHING), (DONE, 'texture: interrupted\n')])
+def test_a_command_is_interrupted_while_a_library_hides_it_and_after_loading(number, library, said):
+    assert ran(f'exec({library.format(number)!r})') == (130, said)
 
 
 def test_ctrl_c_once_more_while_the_program_ends_shows_no_traceback():

@@ -159,9 +159,6 @@ def test_who_interrupts_before_the_request_reads_that_nothing_was_requested(monk
         monkeypatch.setattr(operator, '_step', MagicMock(side_effect=KeyboardInterrupt))
         assert run_program(lambda: operator.wait_for_explorer(1.0)) == 130
     assert capsys.readouterr().err == 'texture: interrupted; nothing was requested\n'
-    monkeypatch.setattr('importlib.metadata.EntryPoint.load', MagicMock(side_effect=KeyboardInterrupt))
-    assert main(['explore', 'linear_slide']) == 130
-    assert capsys.readouterr().err == 'texture: interrupted; nothing was requested\n'
 
 
 def test_the_help_lists_the_motions(capsys):

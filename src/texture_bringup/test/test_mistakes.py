@@ -234,6 +234,7 @@ def test_the_models_are_good_and_the_figures_are_written(data, capsys, tmp_path)
         ('explore linear_slide --repeats 0', '--repeats is 0; 1 or more rounds are needed'),
         ('train default glass leather -o /proc/model', "'/proc/model.npz' cannot be written: No such file"),
         ('train default glass leather -o fast --recipe default', "no option of texture train '--recipe'. Known"),
+        ('train --recipe default', "no option of texture train '--recipe'. Known"),
         ('check nowhere', "there is no model 'nowhere'; give the path of a trained one"),
         (
             'explore --preset ets-linear --speed 0.02 --force 0.5',

@@ -86,12 +86,19 @@ def program() -> int:
     if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # closed terminal; ignored under nohup
         stopping.append(signal.SIGHUP)
     for number in stopping:
-        signal.signal(number, signal.default_int_handler)
+        signal.signal(number, _end)
     try:
         return main()
     finally:
         for number in stopping:  # another one ends what libraries do at the end, without a traceback
             signal.signal(number, lambda *_: os._exit(INTERRUPTED))
+
+
+def _end(*_: object) -> None:
+    """End at a signal; a library that is loading would report an interrupt as an error of its own, or hide it."""
+    line = '\r\x1b[2K' if os.isatty(2) else ''  # of the progress
+    os.write(2, f'{line}texture: interrupted; nothing was requested\n'.encode())
+    os._exit(INTERRUPTED)
 
 
 def _dispatch(given: Sequence[str]) -> int:
@@ -104,13 +111,13 @@ def _dispatch(given: Sequence[str]) -> int:
     name, *rest = given
     command = find(installed(), name, 'sub-command of texture')
     show_progress()
-    try:
-        with task(f'loading the libraries of {name}'):
-            module = cast(Command, command.load())
-            parser = Parser(prog=f'texture {name}', description=summary(command))
-            module.configure(parser)
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt('nothing was requested') from None
+    with task(f'loading the libraries of {name}'):
+        module = cast(Command, command.load())
+        parser = Parser(prog=f'texture {name}', description=summary(command))
+        module.configure(parser)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is _end:
+            signal.signal(number, signal.default_int_handler)
     return module.run(parser.parse_args(rest))
 
 

@@ -228,15 +228,16 @@ class Operator:
         self._guard = guard
         self._context = Context()
         self._domain_id = ros_domain() if domain_id is None else domain_id
-        self._context.init(args=[], domain_id=self._domain_id)  # not those of the command: NAME:=VALUE would remap
-        self._node = Node('operator', namespace=namespace or None, context=self._context, enable_rosout=False)
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._node)
-        self._explore = ActionClient(self._node, action.Explore, 'explore')
-        self._settings: dict[str, AsyncParameterClient] = {}  # of each node, made once: all nodes remember it
-        self._heard_s = 0.0  # of the explorer
-        self._info = msg.ExplorerInfo()
-        self._on_info(partial(setattr, self, '_info'))
+        with uninterrupted():
+            self._context.init(args=[], domain_id=self._domain_id)  # not those of the command: NAME:=VALUE would remap
+            self._node = Node('operator', namespace=namespace or None, context=self._context, enable_rosout=False)
+            self._executor = SingleThreadedExecutor(context=self._context)
+            self._executor.add_node(self._node)
+            self._explore = ActionClient(self._node, action.Explore, 'explore')
+            self._settings: dict[str, AsyncParameterClient] = {}  # of each node, made once: all nodes remember it
+            self._heard_s = 0.0  # of the explorer
+            self._info = msg.ExplorerInfo()
+            self._on_info(partial(setattr, self, '_info'))
         self._states: Any = None  # not subscribed yet: who waits for listeners would count it
         self._vectors: list[FeatureVector] | None = None  # not subscribed yet
 

@@ -56,6 +56,7 @@ def test_a_stop_while_a_node_imports_ends_it_with_0_and_without_a_traceback(numb
         (['oak', '--namespace', 'le ft'], "the namespace is 'le ft'; allowed are letters, digits and _"),
         (['oak', 'elm'], "'elm' is one argument too many; write touch [-h] [--speed M/S]"),
         ([], 'the following arguments are required: surface; write touch [-h] [--speed M/S]'),
+        (['--spede', '1'], "no option of touch '--spede'; did you mean '--speed'?"),
     ],
 )
 def test_a_mistake_in_an_option_is_answered_with_what_came_and_what_is_allowed(given, sentence) -> None:

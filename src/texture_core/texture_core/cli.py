@@ -37,22 +37,28 @@ NUMBERS: Mapping[Any, str] = {int: 'a whole number', float: 'a number'}
 class Parser(argparse.ArgumentParser):
     """Raises an error in a sentence that names what came, what is allowed, and the nearest name."""
 
-    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Return the values of all options; refuse what is none."""
-        options, more = self.parse_known_args(args, namespace)
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Return the values of all options, and no more words; refuse what is no option."""
+        self._words = sys.argv[1:] if args is None else args
+        options, more = super().parse_known_args(args, namespace)
         for word in more:
             if word.startswith('-'):
                 raise unknown_name(word.partition('=')[0], self._option_string_actions, f'option of {self.prog}')
             raise InvalidParameter(f"'{word}' is one argument too many; {self._usage()}")
-        return options
+        return options, more
 
     def error(self, message: str) -> NoReturn:
         """Refuse what argparse refuses, such as a missing argument; of an option, only its form is shown."""
+        usage = self._usage()
+        if required := [one for one in self._actions if one.required]:
+            for one in required:  # what is no option is named before what is missing
+                one.required = False
+            self.parse_known_args(self._words)
         name, _, fault = message.removeprefix('argument ').partition(': ')
         if action := self._option_string_actions.get(name.partition('/')[0]):
             form = self._get_formatter()._format_action_invocation(action)
             raise InvalidParameter(f'{name} {fault}; write {form}')
-        raise InvalidParameter(f'{message.removeprefix("argument ")}; {self._usage()}')
+        raise InvalidParameter(f'{message.removeprefix("argument ")}; {usage}')
 
     def _usage(self) -> str:
         return f'write {" ".join(self.format_usage().split()[1:])}'

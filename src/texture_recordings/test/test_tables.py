@@ -121,6 +121,13 @@ def test_a_condition_of_which_over_a_tenth_are_no_numbers_is_refused(tmp_path: P
         run(tmp_path, mapping_of(tmp_path), broken)
 
 
+def test_of_too_many_rows_without_a_number_the_first_one_is_named(tmp_path: Path, mapping: TableMapping) -> None:
+    broken = {row: f'{5000000 + 10 * row}.00;stroke 1;1.0;nan;2.0;150.0' for row in range(4, 100)} | {50: 'cut'}
+    fault = r"96 malformed rows of 910, first row 7, column 'acc_y': no finite number \(NaN, infinity or blank\)"
+    with pytest.raises(InvalidData, match=fault):
+        run(tmp_path, mapping, broken)
+
+
 def test_a_row_of_units_within_a_slide_is_malformed_and_ends_none(tmp_path: Path) -> None:
     broken = {FIRST_STROKE + 101: 'ms;;mg;mg;mg;gf'}
     any_phase = mapping_of(tmp_path, ('values: [stroke 1, stroke 2, stroke 3]', "values: ['[!r]*', '']"))

@@ -308,6 +308,7 @@ class FrameSlides:
         self._texts = {name: self._frame.texts(name) for name in mapping.texts()}
         numbers = [*(column for columns in self._used.values() for column in columns), *mapping.numbers()]
         self._numbers = {name: self._frame.numbers(name) for name in numbers}
+        self._unknown: dict[int, str] = {}  # by line, of the first rows without a number, which and why
         self._malformed: dict[tuple[int, str], AnyArray] = {}  # by number of rows and what is done with them
         streams = [self._stream(name, params) for name, params in mapping.streams.items()]
         self._check_malformed()
@@ -416,6 +417,9 @@ class FrameSlides:
             if self._group(other) == group:
                 kept &= ~(np.isnan(samples).all(axis=1) & np.isfinite(self._numbers[other]))
         bad &= kept
+        for row in np.flatnonzero(bad)[:EXAMPLES].tolist():
+            column = names[int(np.argmin(np.isfinite(samples[row])))]
+            self._unknown.setdefault(self._line(row), f"column '{column}': no finite number (NaN, infinity or blank)")
         if self._frame.junk is not None and len(self._frame.junk) == len(bad):
             bad |= self._frame.junk
             samples[self._frame.junk] = np.nan
@@ -473,11 +477,12 @@ class FrameSlides:
         if frame.gaps is not None:
             found[len(frame.gaps), 'rows with a condition that is no number'] = frame.gaps
         for (length, done), rows in found.items():
-            what, reasons = done.split(', ')[0], frame.gap_reasons if rows is frame.gaps else frame.reasons
+            what = done.split(', ')[0]
+            reasons = frame.gap_reasons if rows is frame.gaps else {**self._unknown, **frame.reasons}
             alike = [one for (size, other), one in found.items() if size == length and other.startswith(what)]
             count = np.count_nonzero(np.any(alike, axis=0))  # a row may be malformed in both streams
             marked = frame.lines[rows] if frame.lines is not None and len(frame.lines) == length else rows.nonzero()[0]
-            known = [line for line in reasons if line in marked] or marked[:1].tolist()
+            known = sorted(line for line in reasons if line in marked)[:EXAMPLES] or marked[:1].tolist()
             places = [f'row {line}, {reasons.get(line, "no finite number")}' for line in known] or ['no row at all']
             self._report.leave_out(done, len(marked), *(f"'{self._place}', {place}" for place in places))
             if not length or (len(marked) and count > MAX_LEFT_OUT * length):
