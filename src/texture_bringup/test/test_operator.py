@@ -91,13 +91,6 @@ def test_a_wrong_namespace_is_named_with_those_that_have_an_explorer():
             operator.wait_for_explorer(5.0)
 
 
-def test_a_request_that_two_explorers_would_take_is_not_sent():
-    with LocalGraph(DOMAIN) as graph, silent_explorer(), operators.Operator(domain_id=DOMAIN) as operator:
-        graph.add(partial(rclpy.create_node, 'explorer'))
-        with pytest.raises(LaunchFailed, match=r'several explorers are in the ROS_DOMAIN_ID 62 and namespace /;'):
-            operator.wait_for_explorer(3.0)
-
-
 def test_an_explorer_that_was_started_again_is_not_waited_for(monkeypatch):
     monkeypatch.setattr(operators, 'RETRY_PERIOD_S', 0.3)
     with silent_explorer(), ExitStack() as later, operators.Operator(domain_id=DOMAIN) as operator:

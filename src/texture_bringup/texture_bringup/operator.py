@@ -158,7 +158,6 @@ STOP_S = 3.0
 CHOOSE = 'choose its namespace by --namespace, also of `texture dashboard`'
 EMERGENCY = 'if the arm moves, use the emergency stop of the robot'
 NOT_STOPPED = f'the explorer has not answered the stop within {STOP_S:g} s; {EMERGENCY}'
-DISCOVERY_S = 0.2  # from the discovery of one explorer to that of a second, if both run
 SETTINGS_S = 10.0  # to find the parameters of a node
 RETRY_PERIOD_S = 5.0
 # What this process has discovered, the others discover soon after.
@@ -267,12 +266,6 @@ class Operator:
             raise LaunchFailed(
                 f'{missing} (waited {deadline_s:.0f} s); there are explorers in {others}: {CHOOSE}'
             ) from error
-        several = (
-            f'several explorers are in the ROS_DOMAIN_ID {self._domain_id} and namespace {ours}; a request would move '
-            'all their arms: end the others, or give each a namespace. ROS forgets one that was killed after 20 s'
-        )
-        found_s = time.monotonic() + DISCOVERY_S
-        self.wait_until(lambda: time.monotonic() > found_s and self._explorers().count(ours) < 2, deadline_s, several)
 
     def _explorers(self) -> list[str]:
         """Return the namespace of each explorer that is there."""

@@ -127,6 +127,24 @@ def test_a_service_call_explores_and_reports(make_world):
     world.until(lambda: phase_of(world.states[-1]) == 'idle')
 
 
+def test_a_request_that_two_explorers_would_take_is_refused_until_one_has_ended(make_world, graph, monkeypatch):
+    monkeypatch.setattr(SimulatedArm, 'base_frame_id', 'base')
+    monkeypatch.setattr(SimulatedArm, 'surface_pose', (0.0,) * 6)
+    world, twin = make_world(), graph.add(ExplorerNode, watch_signal=False)
+    world.until(lambda: world.peer.count_services('explore') == 2)
+    refused, several = world.explored(**QUICK), 'several explorers are in the ROS_DOMAIN_ID 68 and namespace /;'
+    assert (refused.error_code, refused.exploration_id) == (Result.ERROR_NOT_ACTIVE, '')
+    assert refused.message.startswith(several)
+    touch = world.result(world.peer.create_client(Trigger, 'explorer/touch_surface').call_async(Trigger.Request()))
+    assert not touch.success
+    assert touch.message.startswith(several)
+    world.until(lambda: world.diagnostics and world.diagnostics[-1].status[0].message.startswith(several))
+    twin.shutdown()
+    twin.destroy_node()
+    world.until(lambda: world.peer.count_services('explore') == 1)
+    assert world.explored(**QUICK).error_code == OK
+
+
 def test_the_surface_is_broadcast_where_the_arm_believes_it_in_its_base_frame(make_world, monkeypatch):
     pose, here = (0.4, -0.1, 0.02, 0.2, -0.1, 0.5), (0.01, 0.02, 0.03)
     monkeypatch.setattr(SimulatedArm, 'base_frame_id', 'base')

@@ -179,10 +179,10 @@ def test_an_arm_whose_pose_two_controllers_publish_is_refused(graph):
 
 
 @pytest.mark.parametrize('range_', ['LOCALHOST', 'SUBNET'])
-def test_two_announcements_of_other_commanders_are_waited_for_before_anything_is_published(graph, monkeypatch, range_):
+def test_two_announcements_of_conflicts_are_waited_for_before_anything_is_published(graph, monkeypatch, range_):
     monkeypatch.setattr(controller_topics.Node, 'count_subscribers', lambda *_: 1)
     monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', range_)
-    monkeypatch.setattr(controller_topics.RosTopics, '_other_commander', lambda *_: '')
+    monkeypatch.setattr(controller_topics.RosTopics, '_conflict', lambda *_: '')
     monkeypatch.setattr(controller_topics, 'TwistGuard', lambda *_, **__: pytest.fail('nobody was waited for'))
     slept_s, begin_s = [], time.monotonic()
     monkeypatch.setattr(controller_topics.time, 'sleep', slept_s.append)

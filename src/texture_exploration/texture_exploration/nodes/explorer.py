@@ -80,6 +80,10 @@ PRESSED = (
     'the force sensor shows {:.1f} N, so the finger may press, as after an explorer that was killed: `texture lift` '
     'lifts it now, and the first exploration does so'
 )
+SEVERAL = (
+    'several explorers are in the ROS_DOMAIN_ID {} and namespace {}; a request would move all their arms: end the others, '
+    'or give each a namespace. ROS forgets one that was killed after 20 s'
+)
 RESULT_KEPT_S = 60  # for a late client; rclpy's 15 min are hundreds of results
 
 
@@ -299,6 +303,7 @@ class ExplorerNode(PatientLifecycleNode):
         result = msg.ExplorationResult()
         try:
             exploration_id = new_id(self.get_clock().now().nanoseconds, next(self._numbers), self._rng)
+            self._check_alone()
             self._check_clock()
             exploration = self._explorer.begin(exploration_id, from_msg(request), cancelled)
         except TextureError as error:
@@ -330,6 +335,17 @@ class ExplorerNode(PatientLifecycleNode):
         if not self._closing:
             self._log_end(exploration.exploration_id, outcome)
         return result
+
+    def _check_alone(self) -> None:
+        """Refuse to move while another explorer has this name: it moves its arm at the same requests."""
+        if several := self._several():
+            raise MotionRefused(several, ExplorationError.NOT_ACTIVE)
+
+    def _several(self) -> str:
+        """Return in a sentence that another explorer has this name, '' if none has."""
+        # Not by the names of nodes: ROS may list one that has ended for minutes.
+        several = self.count_services('explore') > 1
+        return SEVERAL.format(self.context.get_domain_id(), self.get_namespace()) if several else ''
 
     def _check_clock(self) -> None:
         """Refuse to move while the time of ROS does not advance: states would have no valid stamps."""
@@ -386,6 +402,7 @@ class ExplorerNode(PatientLifecycleNode):
         return f'the finger rose by {1e3 * self._explorer.lift():.1f} mm, and nothing touches it'
 
     def _touch_surface(self) -> str:
+        self._check_alone()
         message = self._explorer.touch_surface()
         self._broadcast_surface()
         self.set_parameters([Parameter(name, value=value) for name, value in asdict(self._explorer.patch).items()])
@@ -443,7 +460,7 @@ class ExplorerNode(PatientLifecycleNode):
     def _why_not_ready(self) -> str:
         if not self._active:
             return f"{CONNECTING} '{self.get_parameter('arm').value}'" if self._autostart else NO_CONTROL
-        return 'an exploration is running' if self._explorer.current else self._explorer.fault()
+        return 'an exploration is running' if self._explorer.current else self._explorer.fault() or self._several()
 
     def _broadcast_surface(self) -> None:
         """Broadcast the pose of the surface in the base frame of the arm, if it has one."""
@@ -472,7 +489,7 @@ class ExplorerNode(PatientLifecycleNode):
         return replace(state, stamp_ns=stamp_ns, frame_id=self._surface_frame_id)
 
     def _report(self) -> DiagnosticReport:
-        current, fault = self._explorer.current, self._explorer.fault()
+        current, fault = self._explorer.current, self._explorer.fault() or self._several()
         numbers = {
             'phase': current.state.phase.value if current else Phase.IDLE.value,
             'exploration': current.exploration_id if current else '',

@@ -143,7 +143,7 @@ class RosTopics:
         assert self._guard is not None
         fault, now_s = self._guard.fault(), time.monotonic()
         if self._guard.participant and now_s - self._looked_s > LOOKING_S:
-            self._looked_s, self._other = now_s, self._other_commander(self._participant, self._guard.participant)
+            self._looked_s, self._other = now_s, self._conflict(self._participant, self._guard.participant)
         return fault or self._other
 
     def beat(self, *, moving: bool) -> None:
@@ -164,7 +164,7 @@ class RosTopics:
         topic = self._topic
         while True:
             give_up_when_ending()
-            other, now_s = self._other_commander(self._participant), time.monotonic()
+            other, now_s = self._conflict(self._participant), time.monotonic()
             if other or not self._node.count_subscribers(topic):
                 alone_s = 0.0
                 if now_s - begin_s > self._params.connect_timeout_s:
@@ -177,7 +177,7 @@ class RosTopics:
                     return
             time.sleep(LOOKING_S)
 
-    def _other_commander(self, *ours: str) -> str:
+    def _conflict(self, *ours: str) -> str:
         """Return in a sentence another commander or controller, '' if there is none; `ours` are our participants."""
         for info in self._node.get_publishers_info_by_topic(self._topic):
             if sender(info) not in ours:
