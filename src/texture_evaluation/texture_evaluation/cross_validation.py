@@ -63,7 +63,7 @@ def dask_backend(address: str) -> Iterator[None]:
         # A scheduler that takes connections and is silent would hold up the client for minutes.
         asyncio.run(asyncio.wait_for(_reach(cluster_of.comm.connect, address), ANSWER_S))
         client: Any = cluster_of.Client(address, timeout=ANSWER_S, set_as_default=False)
-    except (OSError, ValueError, TimeoutError, RuntimeError, ImportError) as error:
+    except (OSError, ValueError, asyncio.TimeoutError, RuntimeError, ImportError) as error:
         reason = ' '.join(str(error).split()) or type(error).__name__
         raise InvalidParameter(
             f"no Dask scheduler answers at '{address}' ({reason}); {CLUSTER_ADVICE}, "

@@ -81,8 +81,8 @@ PRESSED = (
     'lifts it now, and the first exploration does so'
 )
 SEVERAL = (
-    'several explorers are in the ROS_DOMAIN_ID {} and namespace {}; a request would move all their arms: end the others, '
-    'or give each a namespace. ROS forgets one that was killed after 20 s'
+    'several explorers are in the ROS_DOMAIN_ID {} and namespace {}; a request would move all their arms: end the '
+    'others, or give each a namespace. ROS forgets one that was killed after 20 s'
 )
 RESULT_KEPT_S = 60  # for a late client; rclpy's 15 min are hundreds of results
 
