@@ -115,7 +115,7 @@ def ran(setting: str, *before: str, **environment: str) -> tuple[int, str]:
         capture_output=True,
         text=True,
         check=False,
-        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),  # noqa: PLW1509 - the tests may run under nohup
+        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),  # also under nohup
     )
     return done.returncode, done.stderr
 
