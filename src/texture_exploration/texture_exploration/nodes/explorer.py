@@ -343,7 +343,7 @@ class ExplorerNode(PatientLifecycleNode):
 
     def _several(self) -> str:
         """Return in a sentence that another explorer has this name, '' if none has."""
-        # Not by the names of nodes: ROS may list one that has ended for minutes.
+        # Not by the names of nodes: ROS may list some that have ended.
         several = self.count_services('explore') > 1
         return SEVERAL.format(self.context.get_domain_id(), self.get_namespace()) if several else ''
 
