@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import dataclasses
 import difflib
 import errno
@@ -371,6 +372,22 @@ def ros_domain() -> int:
             f"ROS_DOMAIN_ID is '{text}'; set it to a whole number from 0 to {MAX_DOMAIN}, or unset it"
         )
     return int(text)
+
+
+def check_middleware() -> None:
+    """Refuse a middleware of ROS that is not installed, of which rcl would end the process as it is loaded."""
+    name = os.environ.get('RMW_IMPLEMENTATION', '')
+    library = f'lib{name}.so'
+    places = [place / 'lib' for place in _prefixes()]
+    places += [Path(item) for item in os.environ.get('LD_LIBRARY_PATH', '').split(os.pathsep)]
+    if not name or any((place / library).exists() for place in places):
+        return
+    try:
+        ctypes.CDLL(library)  # one that the system finds elsewhere
+    except OSError as error:
+        raise InvalidParameter(
+            f"RMW_IMPLEMENTATION is '{name}', which is not installed here; unset it, or install that package of ROS"
+        ) from error
 
 
 def ros_namespace(text: str) -> str:
