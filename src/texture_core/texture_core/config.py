@@ -452,7 +452,9 @@ def parameter_sections(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
         content = load_yaml(path, 'parameter file')
     except InvalidParameter as error:
         raise InvalidParameter(f'{" ".join(str(error).split())}; {PARAMETER_FILE}') from error
-    return sections({} if content is None else {'': content})
+    # As the suite's template, a file of comments alone may give none; one that is empty was not written to its end
+    blank = content is None and '#' in read_text(path, 4 * MAX_CHARACTERS)
+    return sections({} if blank else {'': content})
 
 
 def reaches(section: str, node: str) -> bool:
