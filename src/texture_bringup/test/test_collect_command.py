@@ -23,6 +23,7 @@ from texture_core.errors import (
     InvalidParameter,
     LaunchFailed,
     ModelMismatch,
+    MotionAborted,
     TextureError,
 )
 from texture_core.types import RoughnessEstimate, TextureEstimate
@@ -35,7 +36,8 @@ EXPLORER = {
     'patch_x_low_m': -0.05, 'patch_x_high_m': 0.05, 'patch_y_low_m': -0.05, 'patch_y_high_m': 0.05,
     'min_force_n': 3.0, 'max_force_n': 8.0, 'max_speed_m_s': 0.03,
 }  # fmt: skip
-REFUSED, ABORTED = (ExplorationError.INVALID_REQUEST, ''), (ExplorationError.FORCE_LIMIT, 'id')
+REFUSED = ExplorationError.INVALID_REQUEST, ''
+ABORTED, PRESSING = ((ExplorationError.FORCE_LIMIT, 'id', lifted) for lifted in (True, False))
 
 
 class Explorer:
@@ -57,7 +59,10 @@ class Explorer:
         end = self._ends.pop(0)
         if isinstance(end, BaseException):
             raise end
-        return ExplorationResult(end[0], 'it failed', end[1], TextureEstimate(0, ''), RoughnessEstimate(0, ''))
+        error, name, *lifted = end
+        return ExplorationResult(
+            error, 'it failed', name, TextureEstimate(0, ''), RoughnessEstimate(0, ''), (), *lifted
+        )
 
 
 @pytest.fixture
@@ -102,6 +107,8 @@ def test_forces_and_speeds_are_those_that_the_explorer_allows(collected, tmp_pat
     [
         ((REFUSED, REFUSED, REFUSED), CollectionError.MOTION_FAILED, False),
         ((REFUSED, ABORTED, REFUSED), CollectionError.MOTION_FAILED, False),
+        ((REFUSED, PRESSING), CollectionError.MOTION_FAILED, False),  # no third touch
+        ((MotionAborted('it was restarted'),), CollectionError.MOTION_FAILED, False),
         ((REFUSED, KeyboardInterrupt('lifted')), CollectionError.CANCELLED, False),  # in the middle of a touch
         (None, CollectionError.NOT_RECORDED, True),  # the recorder has ended, and the bag may be another's
     ],
@@ -277,8 +284,10 @@ def test_a_slide_counts_when_the_recorder_has_it_on_the_disk(tmp_path, monkeypat
     recording.log.write_text("[record]: exploration 'a' is on the disk: 9 messages recorded, nothing lost\n")
     assert recording.wait_for('a') == ''
     with recording.log.open('a') as log:
-        log.write("[record]: exploration 'a-2' is on the disk: 99 messages recorded, 35 samples lost\n")
-    assert recording.wait_for('a-2') == '35 samples lost'
+        log.write(
+            "[record]: exploration 'a-2' is on the disk: 99 messages recorded, 35 samples lost (or replayed) in one\n"
+        )
+    assert recording.wait_for('a-2') == '35 samples lost in one'  # in brackets is what else it means in a replay
     monkeypatch.setattr(explore, 'WRITTEN_S', 0.0)
     with pytest.raises(InvalidData, match="has not written the slide 'b' within 0 s; check the disk"):
         recording.wait_for('b')
@@ -293,5 +302,10 @@ def test_who_was_stopped_reads_how_to_continue(error, tmp_path, monkeypatch, cap
     main(['collect', 'cork', str(tmp_path), '--seed', '4'])
     said = ''.join(capsys.readouterr()).splitlines()[0]
     kept = f"so it ended; 1 slide in '{tmp_path / 'cork'}'"
-    ends = error in (CollectionError.NONE, CollectionError.BOUND_MISSED)
-    assert said == (kept if ends else f"{kept}; continue at other places with --seed 5, into '{tmp_path / 'cork-2'}'")
+    following = f"; continue at other places with --seed 5, into '{tmp_path / 'cork-2'}'"
+    unlike = {
+        CollectionError.NONE: '',
+        CollectionError.BOUND_MISSED: '',
+        CollectionError.NOT_RECORDED: '; then continue at other places with --seed 5',  # the disk may be full
+    }
+    assert said == kept + unlike.get(error, following)

@@ -81,6 +81,21 @@ def test_a_reader_who_has_seen_enough_ends_the_command_quietly(arguments) -> Non
     assert (ended.returncode, said) == (141, [])
 
 
+@pytest.mark.parametrize('unbuffered', ['', '1'])
+def test_output_onto_a_full_disk_is_one_sentence(unbuffered) -> None:
+    command = [sys.executable, '-m', 'texture_bringup.command']
+    with Path('/dev/full').open('w') as full:
+        ended = subprocess.run(
+            command,
+            check=False,
+            stdout=full,
+            stderr=subprocess.PIPE,
+            env={**os.environ, 'PYTHONUNBUFFERED': unbuffered},
+        )
+    sentence = b'texture: the output cannot be written: No space left on device; make room, or write it elsewhere\n'
+    assert (ended.returncode, ended.stderr) == (2, sentence)
+
+
 @pytest.mark.parametrize('name', installed())
 def test_every_sub_command_explains_itself(name, capsys) -> None:
     with pytest.raises(SystemExit) as ended:
@@ -157,15 +172,37 @@ def test_ctrl_c_once_more_while_the_program_ends_shows_no_traceback():
     assert ran(f'command.main = lambda: 130; {again}') == (130, '')
 
 
+DOMAIN, MIDDLEWARE = 'ROS_DOMAIN_ID', 'RMW_IMPLEMENTATION'
+ALLOWED = {
+    DOMAIN: '; set it to a whole number from 0 to 232, or unset it',
+    MIDDLEWARE: ', which is not installed here; unset it, or install that package of ROS',
+}
+
+
 @pytest.mark.parametrize(
-    ('command', 'domain'),
-    [('stop', 'abc'), ('explore linear_slide', '-1'), ('launch emulator', '233'), ('dashboard', '900')],
+    ('command', 'name', 'value'),
+    [
+        ('stop', DOMAIN, 'abc'),
+        ('explore linear_slide', DOMAIN, '-1'),
+        ('launch emulator', DOMAIN, '233'),
+        ('dashboard', DOMAIN, '900'),
+        ('stop', MIDDLEWARE, 'rmw_none_cpp'),
+        ('launch emulator', MIDDLEWARE, 'rmw_none_cpp'),
+        ('dashboard', MIDDLEWARE, 'rmw_none_cpp'),
+    ],
 )
-def test_a_domain_that_ros_cannot_have_is_refused_with_the_allowed_range(command, domain):
-    code, said = ran(f'sys.argv[1:] = {command.split()}', ROS_DOMAIN_ID=domain)
-    lines = [line for line in said.splitlines() if not line.startswith('loading the libraries ')]  # on a busy machine
-    wanted = f"texture: ROS_DOMAIN_ID is '{domain}'; set it to a whole number from 0 to 232, or unset it"
-    assert (code, lines) == (2, [wanted])
+def test_a_setting_that_ros_cannot_have_is_refused_with_what_is_allowed(command, name, value):
+    code, said = ran(f'sys.argv[1:] = {command.split()}', **{name: value})
+    quiet = ('loading the libraries ', 'checking what the launch')  # on a busy machine
+    lines = [line for line in said.splitlines() if not line.startswith(quiet)]
+    assert (code, lines) == (2, [f"texture: {name} is '{value}'{ALLOWED[name]}"])
+
+
+def test_the_doctor_shows_a_missing_middleware_and_goes_on():
+    code, said = ran("sys.argv[1:] = ['doctor']; sys.stdout = sys.stderr", RMW_IMPLEMENTATION='rmw_none_cpp')
+    assert code == 0
+    assert "cannot be loaded: RMW_IMPLEMENTATION is 'rmw_none_cpp'" in said
+    assert '\nversions ' in said
 
 
 NODES = {'tare': 'sensor'}  # the others are of the explorer

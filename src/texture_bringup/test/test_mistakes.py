@@ -57,6 +57,7 @@ def data(tmp_path_factory):
     assert main(['train', 'vibration-and-taxels', *bags, '-o', str(folder / 'all')]) == 0
     os.mkfifo(folder / 'pipe')
     (folder / 'csv').mkdir()
+    (folder / 'empty.yaml').touch()
     (folder / 'csv' / 'cork.csv').write_text('acc\n' + '1\n2\n' * 500)
     (folder / 'map.yaml').write_text('{label: {value: cork}, streams: {signal: {columns: [acc]}}}')
     (folder / 'mine.launch.py').write_text('from launch import LaunchDescription')
@@ -243,6 +244,10 @@ def test_the_models_are_good_and_the_figures_are_written(data, capsys, tmp_path)
         ('explore --preset kaboli --direction 45', '--direction came with --preset'),
         ('explore', 'give either a motion, such as linear_slide, or --preset NAME'),
         ('explore circular --preset ets-linear', "'circular' and the preset 'ets-linear' came; give either a motion"),
+        ('explore linear_slide --force nan', '--force is nan; finite numbers are needed'),
+        ('explore linear_slide --start 0 -inf', '--start is 0.0 -inf; finite numbers are needed'),
+        ('collect a/b out', "the label 'a/b' has a slash"),
+        ('collect cork out --speed 0.1 0.2', 'm lasts 0.20 s at 0.2 m/s; 0.6 s are needed to recognise it'),
         ('collect cork out --force 6 3', "'force_low_n' is 6; it must not be above 'force_high_n', 3"),
         ('collect cork fast.npz', "'fast.npz' cannot be the folder of the bags: it is a file; name another"),
         ('collect cork /proc/none', "'/proc/none' cannot be the folder of the bags: No such file or directory"),
@@ -254,6 +259,10 @@ def test_the_models_are_good_and_the_figures_are_written(data, capsys, tmp_path)
         ('launch emulator surfcae:=glass', "did you mean 'surface'?"),
         ('launch emulator max_force_n:=5', 'Parameters of the explorer are in the file of explorer_params:=FILE'),
         ('launch emulator surface', 'write NAME:=VALUE'),
+        ('launch emulator surface:=a surface:=b', "'surface' came twice, as 'a' and as 'b'; give it once"),
+        ('set emulator surface:=a surface:=b', "'surface' came twice, as 'a' and as 'b'; give it once"),
+        ('launch emulator explorer_params:=csv', "'csv' is a folder; give the path of a parameter file"),
+        ('launch emulator explorer_params:=empty.yaml', "parameter file 'empty.yaml' gives no parameters to a node"),
         ('launch ros_controllers preset:=moveit_serv', "did you mean 'moveit_servo'?"),
         ('launch emulator surface:=glas', "no surface 'glas'; did you mean 'glass'?"),
         ('launch emulator recipe:=defualt', "did you mean 'default'?"),

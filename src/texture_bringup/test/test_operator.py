@@ -19,7 +19,7 @@ from texture_msgs import action, msg
 
 from texture_bringup import operator as operators
 from texture_bringup.feed import Feed
-from texture_core.errors import LaunchFailed, MotionAborted, MotionRefused
+from texture_core.errors import LaunchFailed, MotionAborted, MotionRefused, UnknownName
 from texture_core.ros import STATE_QOS, quality_of_service, to_msg
 from texture_core.ros_testing import LocalGraph
 from texture_core.types import ExplorationRequest, ExplorationState, Phase
@@ -89,6 +89,22 @@ def test_a_wrong_namespace_is_named_with_those_that_have_an_explorer():
             match=r'ROS_DOMAIN_ID 62 and namespace /lefft \(.* explorers in /left, /right: choose .* `texture dash',
         ):
             operator.wait_for_explorer(5.0)
+
+
+def test_a_misspelled_node_is_named_with_the_nearest_that_is_there_and_a_missing_one_with_the_place(monkeypatch):
+    for name in ('OFFERED_S', 'SETTINGS_S'):
+        monkeypatch.setattr(operators, name, 3.0)
+    with LocalGraph(DOMAIN) as graph, operators.Operator('left', DOMAIN) as operator:
+        graph.add(partial(rclpy.create_node, 'emulator', namespace='left'))
+        near = "no running node 'emulater'; did you mean 'emulator'\\? Known: emulator$"
+        with pytest.raises(UnknownName, match=near):
+            operator.set_parameters('emulater', {'surface': 'glass'})
+        with pytest.raises(UnknownName, match=near):
+            operator.set_active('emulater', active=True)
+        with pytest.raises(LaunchFailed, match='no lifecycle node'):
+            operator.set_active('emulator', active=True)
+        with pytest.raises(LaunchFailed, match='no classifier answers in the ROS_DOMAIN_ID 62 and namespace /left; st'):
+            operator.remove('cork')
 
 
 def test_an_explorer_that_was_started_again_is_not_waited_for(monkeypatch):

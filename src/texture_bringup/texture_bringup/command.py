@@ -27,7 +27,7 @@ from io import TextIOWrapper
 from typing import cast
 
 from texture_core.cli import INTERRUPTED, Command, Parser, run_program, show_progress, task
-from texture_core.config import find
+from texture_core.config import check_middleware, find
 
 GROUP, PACKAGE = 'texture.commands', 'texture_bringup'
 # In what order the help shows the commands; those of other packages come last.
@@ -77,8 +77,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return run_program(partial(_dispatch, given))
 
 
+class MiddlewareCheck(importlib.abc.MetaPathFinder):
+    """Checks the middleware of ROS when a module imports rclpy, so that what needs no ROS runs without it."""
+
+    def find_spec(self, fullname: str, *_: object) -> None:
+        """Find nothing; raise InvalidParameter before rclpy if the middleware is not installed."""
+        if fullname == 'rclpy':
+            check_middleware()
+
+
 def program() -> int:
     """Run the command as a process, which shuts down in order when it is asked to stop."""
+    sys.meta_path.insert(0, MiddlewareCheck())
     for stream in (sys.stdout, sys.stderr):  # an encoding may lack a letter
         cast(TextIOWrapper, stream).reconfigure(errors='backslashreplace')
     # Also where a shell has started the command in the background and made it ignore Ctrl-C.

@@ -482,12 +482,14 @@ def find_launch_file(name_or_path: str) -> Path:
 
 
 def given_arguments(texts: Iterable[str]) -> dict[str, str]:
-    """Return the launch arguments in texts of the form NAME:=VALUE; the last one of a name counts."""
-    given = {}
+    """Return the launch arguments in texts of the form NAME:=VALUE."""
+    given: dict[str, str] = {}
     for text in texts:
         name, mark, value = text.partition(':=')
         if not (name and mark):
             raise InvalidLaunch(f"argument '{text}' has no value; write NAME:=VALUE")
+        if name in given:
+            raise InvalidLaunch(f"'{name}' came twice, as '{given[name]}' and as '{value}'; give it once")
         given[name] = value
     return given
 
@@ -690,5 +692,6 @@ class _Reader:
         if not path.is_file():
             if path.parts[-4:-1] == ('texture_bringup', 'config', 'robots'):
                 raise unknown_name(path.stem, [item.stem for item in path.parent.glob('*.yaml')], 'preset')
-            raise InvalidLaunch(f"there is no parameter file '{self.text(element, 'from')}'; give the path of one")
+            fault = f"'{path}' is a folder" if path.is_dir() else f"there is no parameter file '{path}'"
+            raise InvalidLaunch(f'{fault}; give the path of a parameter file')
         return path

@@ -419,7 +419,8 @@ class Operator:
         missing = f"no lifecycle node '{node}' answers; start it, or give its --namespace"
         silent = f"node '{node}' has not answered yet; look at its output"
         for _ in range(3):  # two transitions at most, and a look at the state behind them
-            state = self._ask(GetState, f'{node}/get_state', GetState.Request(), missing, silent)
+            with self._naming(node):
+                state = self._ask(GetState, f'{node}/get_state', GetState.Request(), missing, silent)
             label = str(state.current_state.label)
             if label not in STEPS[active]:
                 break
@@ -453,7 +454,10 @@ class Operator:
 
     def _ask_classifier(self, kind: Any, name: str, request: Any) -> Any:
         """Return the answer of a service of the classifier that succeeded."""
-        missing = 'no classifier answers; is it running?'
+        missing = (
+            f'no classifier answers in the ROS_DOMAIN_ID {self._domain_id} and namespace {self._node.get_namespace()}; '
+            f'start the launch, or {CHOOSE}'
+        )
         silent = 'the classifier has not answered yet; look at its output'
         answer = self._ask(kind, name, request, missing, silent)
         if not answer.success if kind is Trigger else answer.error_code:
@@ -496,8 +500,21 @@ class Operator:
         if node not in self._settings:
             self._settings[node] = AsyncParameterClient(self._node, node)
         client = self._settings[node]
-        self.wait_until(client.services_are_ready, SETTINGS_S, f"no node '{node}' answers; start it, or {CHOOSE}")
+        with self._naming(node):
+            self.wait_until(client.services_are_ready, SETTINGS_S, f"no node '{node}' answers; start it, or {CHOOSE}")
         return client
+
+    @contextmanager
+    def _naming(self, node: str) -> Iterator[None]:
+        """Name the nodes of the namespace where the block fails as no node of this name is among them."""
+        try:
+            yield
+        except LaunchFailed as error:
+            us, ours = self._node.get_name(), self._node.get_namespace()
+            there = {name for name, space in self._node.get_node_names_and_namespaces() if space == ours} - {us}
+            if not there or node in there:
+                raise
+            raise unknown_name(node, there, 'running node') from error
 
     def _answer(self, node: str, future: Future) -> Any:
         """Return the answer of a node that may run without an explorer."""

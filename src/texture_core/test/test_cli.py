@@ -49,6 +49,10 @@ def test_a_stop_while_a_node_imports_ends_it_with_0_and_without_a_traceback(numb
             ['oak', '--spedd', '1'],
             "no option of touch '--spedd'; did you mean '--speed'? Known: --help, --jobs, --kind, ",
         ),
+        *(
+            (['oak', '--speed', number, '--jobs', '0'], "--jobs is '0'; 0 cores compute nothing")
+            for number in ('-5e-05', '-1.E3', '-.5', '-inf', '-nan')
+        ),
         (['oak', '--speed', 'fast'], "--speed is 'fast'; a number is needed: speed, 5 % at least"),
         (['oak', '--jobs', '0'], "--jobs is '0'; 0 cores compute nothing; 1 or more are needed, or -1 for all"),
         (['oak', '--kind', 'liner'], "no value of --kind 'liner'; did you mean 'linear'? Known: circular, linear"),

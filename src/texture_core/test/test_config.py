@@ -22,6 +22,7 @@ from texture_core.config import (
     MAX_FILE_BYTES,
     Archive,
     FileRefused,
+    check_middleware,
     find,
     find_file,
     folder,
@@ -112,6 +113,20 @@ def test_a_shipped_file_is_found_by_name_in_an_installation(tmp_path: Path, monk
     assert find_file('good', 'some_package', 'config', 'recipe') == shipped / 'good.yaml'
     with pytest.raises(UnknownName, match="no recipe 'goood'; did you mean 'good'"):
         find_file('goood', 'some_package', 'config', 'recipe')
+
+
+@pytest.mark.parametrize(
+    ('name', 'setting', 'place'),
+    [('', 'AMENT_PREFIX_PATH', ''), ('one', 'AMENT_PREFIX_PATH', 'lib'), ('one', 'LD_LIBRARY_PATH', '')],
+)
+def test_a_middleware_that_is_there_is_not_refused(
+    name: str, setting: str, place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / place).mkdir(exist_ok=True)
+    (tmp_path / place / 'libone.so').touch()
+    monkeypatch.setenv('RMW_IMPLEMENTATION', name)
+    monkeypatch.setenv(setting, f'/nowhere:{tmp_path}')
+    check_middleware()
 
 
 @pytest.mark.parametrize('name', ['mine.yaml', 'some/folder/mine'])

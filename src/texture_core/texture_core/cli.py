@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import os
+import re
 import shutil
 import sys
 import threading
@@ -36,6 +38,11 @@ NUMBERS: Mapping[Any, str] = {int: 'a whole number', float: 'a number'}
 
 class Parser(argparse.ArgumentParser):
     """Raises an error in a sentence that names what came, what is allowed, and the nearest name."""
+
+    def __init__(self, **given: Any) -> None:
+        super().__init__(**given)
+        # Not taken for an option: argparse knows no exponent, inf and nan, of which the range is checked
+        self._negative_number_matcher = re.compile(r'-((\d+\.?\d*|\.\d+)(e[+-]?\d+)?|inf|nan)$', re.IGNORECASE)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Return the values of all options, and no more words; refuse what is no option."""
@@ -214,6 +221,7 @@ def progress(items: Iterable[T], what: str, total: int = 0) -> Iterator[T]:
 # End of a program of the suite: exit codes, and one sentence for an error of the user.
 
 USER_ERROR, INTERRUPTED, CUT_OFF = 2, 130, 141
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def run_program(action: Callable[[], int], name: str = 'texture') -> int:
@@ -224,13 +232,17 @@ def run_program(action: Callable[[], int], name: str = 'texture') -> int:
         finally:
             sys.stdout.flush()
     except BrokenPipeError:
-        # The remaining output is discarded; otherwise Python reports an error at its end.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _discard_output()
         return CUT_OFF
     except TextureError as error:
         print(f'{name}: {error}', file=sys.stderr)
         return USER_ERROR
     except OSError as error:
+        if error.filename is None and error.errno in NO_ROOM:
+            _discard_output()
+            sentence = f'the output cannot be written: {error.strerror}; make room, or write it elsewhere'
+            print(f'{name}: {sentence}', file=sys.stderr)
+            return USER_ERROR
         if error.filename is None:  # no file: a fault of the program, whose traceback is needed
             raise
         print(f"{name}: '{error.filename}' cannot be used: {error.strerror}; give another path", file=sys.stderr)
@@ -238,3 +250,8 @@ def run_program(action: Callable[[], int], name: str = 'texture') -> int:
     except KeyboardInterrupt as interrupt:
         print('; '.join(filter(None, (f'{name}: interrupted', str(interrupt)))), file=sys.stderr)
         return INTERRUPTED
+
+
+def _discard_output() -> None:
+    """Discard the remaining output; otherwise Python reports an error at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import dataclasses
 import difflib
 import errno
@@ -373,6 +374,22 @@ def ros_domain() -> int:
     return int(text)
 
 
+def check_middleware() -> None:
+    """Refuse a middleware of ROS that is not installed, of which rcl would end the process as it is loaded."""
+    name = os.environ.get('RMW_IMPLEMENTATION', '')
+    library = f'lib{name}.so'
+    places = [place / 'lib' for place in _prefixes()]
+    places += [Path(item) for item in os.environ.get('LD_LIBRARY_PATH', '').split(os.pathsep)]
+    if not name or any((place / library).exists() for place in places):
+        return
+    try:
+        ctypes.CDLL(library)  # one that the system finds elsewhere
+    except OSError as error:
+        raise InvalidParameter(
+            f"RMW_IMPLEMENTATION is '{name}', which is not installed here; unset it, or install that package of ROS"
+        ) from error
+
+
 def ros_namespace(text: str) -> str:
     """Return a namespace of ROS as it was given; InvalidParameter if it cannot be one."""
     if not re.fullmatch(r'/?([A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?/?', text):
@@ -435,7 +452,9 @@ def parameter_sections(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
         content = load_yaml(path, 'parameter file')
     except InvalidParameter as error:
         raise InvalidParameter(f'{" ".join(str(error).split())}; {PARAMETER_FILE}') from error
-    return sections({} if content is None else {'': content})
+    # As the suite's template, a file of comments alone may give none; one that is empty was not written to its end
+    blank = content is None and '#' in read_text(path, 4 * MAX_CHARACTERS)
+    return sections({} if blank else {'': content})
 
 
 def reaches(section: str, node: str) -> bool:

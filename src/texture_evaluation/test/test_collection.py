@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from texture_core.errors import CollectionError, ExplorationError, InvalidData, InvalidParameter
+from texture_core.errors import CollectionError, ExplorationError, InvalidData, InvalidParameter, MotionAborted
 from texture_evaluation.collection import (
     BANDS_M,
     Band,
@@ -269,6 +269,7 @@ def test_three_failures_in_a_row_end_it_and_two_do_not():
         (KeyboardInterrupt('the finger is lifted'), CollectionError.CANCELLED, 'stopped: the finger is lifted'),
         (KeyboardInterrupt(), CollectionError.CANCELLED, 'stopped'),
         (InvalidData('the recorder ended: no space'), CollectionError.NOT_RECORDED, 'the recorder ended: no space'),
+        (MotionAborted('it may press'), CollectionError.MOTION_FAILED, 'it may press'),
         (OSError('no space'), CollectionError.NOT_RECORDED, 'no space'),
     ],
 )

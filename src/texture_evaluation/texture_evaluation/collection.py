@@ -17,7 +17,15 @@ import numpy as np
 from scipy.stats import beta
 
 from texture_core.config import param
-from texture_core.errors import CollectionError, ExplorationError, InvalidData, InvalidParameter, TextureError, counted
+from texture_core.errors import (
+    CollectionError,
+    ExplorationError,
+    InvalidData,
+    InvalidParameter,
+    MotionAborted,
+    TextureError,
+    counted,
+)
 from texture_core.types import Array, ExplorationRequest, checked_label
 from texture_estimation.acceptance import LEAST_SLIDES_A_LABEL
 from texture_estimation.domain import Domain
@@ -65,11 +73,21 @@ class CollectionParams:
     seed: int = param(0, 'Seed of places and directions.', low=0)
 
     def __post_init__(self) -> None:
+        if self.speed_high_m_s:
+            self.check_duration(self.speed_high_m_s)
         for low, high in (('places', 'most_places'), *USUAL):
             if getattr(self, low) > getattr(self, high) > 0:  # 0 is chosen later
                 raise InvalidParameter(
                     f"'{low}' is {getattr(self, low):g}; it must not be above '{high}', {getattr(self, high):g}"
                 )
+
+    def check_duration(self, highest_m_s: float) -> None:
+        """Refuse slides that are too short at this speed."""
+        if (shortest_s := self.distance_m / highest_m_s) < SHORTEST_S:
+            raise InvalidParameter(
+                f"a slide of 'distance_m' {self.distance_m:g} m lasts {shortest_s:.2f} s at {highest_m_s:g} m/s; "
+                f'{SHORTEST_S:g} s are needed to recognise it'
+            )
 
 
 @dataclass(frozen=True)
@@ -80,6 +98,13 @@ class Patch:
     x_high_m: float
     y_low_m: float
     y_high_m: float
+
+
+def named(surface: str) -> str:
+    """Return the label of a surface; InvalidData if it is none."""
+    if label := checked_label(surface):
+        return label
+    raise InvalidData('no surface was named; give its label')
 
 
 UNLIMITED = (0.0, math.inf)
@@ -118,18 +143,11 @@ class PlacePlan:
         allowed_forces_n: tuple[float, float] = UNLIMITED,
         allowed_speeds_m_s: tuple[float, float] = UNLIMITED,
     ) -> None:
-        self._surface, self._params, self._patch = checked_label(surface), params, patch
-        if not self._surface:
-            raise InvalidData('no surface was named; give its label')
+        self._surface, self._params, self._patch = named(surface), params, patch
         forces, speeds = USUAL
         self._forces_n = fitted_range(params, forces, allowed_forces_n)
         self._speeds_m_s = fitted_range(params, speeds, allowed_speeds_m_s)
-        highest_m_s = self._speeds_m_s[1]
-        if (shortest_s := params.distance_m / highest_m_s) < SHORTEST_S:
-            raise InvalidParameter(
-                f"a slide of 'distance_m' {params.distance_m:g} m lasts {shortest_s:.2f} s at {highest_m_s:g} m/s; "
-                f'{SHORTEST_S:g} s are needed to recognise it'
-            )
+        params.check_duration(self._speeds_m_s[1])
         self._rng = np.random.default_rng(params.seed)
         self._middles: list[Array] = []
         if not self._candidates():
@@ -331,7 +349,8 @@ def collect(
 ) -> CollectionEnd:
     """Touch place after place until the bound is met, the places are used up, or it cannot or must not continue.
 
-    Ctrl-C, a recorder that ends and recordings that cannot be read are also such ends: the slides so far count.
+    Ctrl-C, a recorder that ends and recordings that cannot be read are also such ends: the slides so far count. So is
+    a MotionAborted of `explore`: after it the finger may still press, and must not be moved.
     """
     slides, failures, accuracy = 0, 0, PlaceAccuracy(0, 0)
 
@@ -366,7 +385,8 @@ def collect(
     except KeyboardInterrupt as stop:
         return ended(CollectionError.CANCELLED, f'stopped: {stop}' if str(stop) else 'stopped')
     except (TextureError, OSError) as error:
-        return ended(CollectionError.NOT_RECORDED, str(error))
+        moved = isinstance(error, MotionAborted)
+        return ended(CollectionError.MOTION_FAILED if moved else CollectionError.NOT_RECORDED, str(error))
     missing = f'; the bound of {100 * params.bound:.0f} % is not met: '
     missing += (
         f'also collect {accuracy.confused} at more places, use other speeds and forces, or add slow channels'

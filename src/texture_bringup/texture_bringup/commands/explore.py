@@ -201,6 +201,10 @@ def requests_of(options: argparse.Namespace) -> list[ExplorationRequest]:
         ]
     find(MOTIONS, options.motion, 'motion')  # refused before the wait for an explorer
     x_m, y_m = options.start or (0.0, 0.0)
+    each = {option: [numbers[field]] for field, option in NUMBERS.items()}
+    for option, values in {**each, '--direction': options.direction, '--start': [x_m, y_m]}.items():
+        if not all(map(math.isfinite, values)):
+            raise InvalidParameter(f'{option} is {" ".join(map(str, values))}; finite numbers are needed')
     request = ExplorationRequest(
         options.motion,
         use_start=options.start is not None,
@@ -343,8 +347,8 @@ def collect_surface(
             def explore(request: ExplorationRequest) -> tuple[ExplorationError, str]:
                 recording.check()
                 try:
-                    explored = operator.explore(request, stopped=stopped)
-                except (MotionRefused, MotionAborted) as error:
+                    explored = lifted(operator.explore(request, stopped=stopped))
+                except MotionRefused as error:
                     return error.error, str(error)
                 except Interrupted as stop:
                     if stop.completed:
@@ -369,6 +373,13 @@ def collect_surface(
         return end, bag
     _remove(bag)
     return replace(end, message=f'{end.message}; no slide was made, so no bag is kept'), None
+
+
+def lifted(explored: ExplorationResult) -> ExplorationResult:
+    """Return a result; MotionAborted if the finger moved and is not known to be lifted."""
+    if explored.exploration_id and not (explored.success or explored.lifted):
+        raise MotionAborted(explored.message)
+    return explored
 
 
 def _remove(bag: Path) -> None:
@@ -433,7 +444,7 @@ class RecorderProcess(Child):
                         'disk, or reduce the load of the computer'
                     )
                 time.sleep(POLL_S)
-        return found[1].replace('nothing lost', '')
+        return re.sub(r'nothing lost| \(.*?\)', '', found[1])  # in brackets is what else it means in a replay
 
 
 @contextmanager
@@ -509,8 +520,9 @@ def claimed(folder: Path) -> Iterator[None]:
 
 def _collect(options: argparse.Namespace) -> int:
     """Collect, and report how well left-out places are recognised; return 0 if the bound is met, else 1."""
-    from texture_evaluation.collection import CollectionParams, next_bag
+    from texture_evaluation.collection import CollectionParams, named, next_bag
 
+    named(options.surface)  # refused before the wait for an explorer
     given = dict(zip(SHORTER, (options.distance, *options.speed, *options.force), strict=True))
     params, folder = parameters_from(options, CollectionParams, given), options.folder
     try:
@@ -528,8 +540,10 @@ def _collect(options: argparse.Namespace) -> int:
                 folder.rmdir()
     kept = f"; {counted(end.slides, 'slide')} in '{bag}'" if bag else ''
     if end.error not in (CollectionError.NONE, CollectionError.BOUND_MISSED):
-        following = next_bag(folder, options.surface)
-        kept += f"; continue at other places with --seed {params.seed + 1}, into '{following}'"
+        # Where nothing could be recorded, the cause says what to do first, which may be to name another folder
+        unwritten = end.error is CollectionError.NOT_RECORDED
+        into = '' if unwritten else f", into '{next_bag(folder, options.surface)}'"
+        kept += f'; {"then " * unwritten}continue at other places with --seed {params.seed + 1}{into}'
     print(f'{end.message}{kept}', file=sys.stderr if end.error else sys.stdout)
     if end.error is CollectionError.CANCELLED:
         raise KeyboardInterrupt
