@@ -824,7 +824,11 @@ CONTAINERS: dict[str, tuple[Write, dict, Truth]] = {
     'an array on its side': (
         npz(**{'1/a': np.c_[T, 0.06 + 0.01 * X, 0.05 + 0.01 * X, 0.1 + 0.01 * Y].T}),
         {**ANY, **numbered('1-3'), 'tables': '{i}/a'},
-        r"'0': time goes back .*; if the array lies on its side, write format: \{transpose: true\}",
+        r"'0': time goes back .*: if the array lies on its side, write format: \{transpose: true\}",
+    ),
+    'an array on its side whose first samples grow': (
+        npz(**{'1/a': np.c_[T, 1.4 + 0.01 * X, 2.8 + 0.01 * Y].T}), {**ANY, **numbered('1-2'), 'tables': '{i}/a'},
+        r'has 3 rows and 600 columns: if the array lies .*transpose: true\}; the rate of .* by its times; give a col',
     ),
     'sounds of two rates': (
         both(*(lambda folder, hz=hz: wavfile.write(folder / f'cork_{hz}.wav', hz, X) for hz in (8000, 9000))), SOUND,
