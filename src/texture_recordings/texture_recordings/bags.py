@@ -14,7 +14,7 @@ import struct
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import replace
 from functools import cache, partial
 from itertools import accumulate, pairwise
@@ -816,6 +816,7 @@ class SlideBags:
 
     def __init__(self, out: str | Path | None) -> None:
         self._out = None if out is None else Path(out)
+        self._makes_out = self._out is not None and not self._out.exists()
         self._open = ExitStack()
         self._open.push(self._remove)
         self._bags: dict[str, BagWriter] = {}
@@ -872,6 +873,9 @@ class SlideBags:
         self._open.__exit__(*error)
 
     def _remove(self, error: type[BaseException] | None, *_: object) -> None:
-        """Remove the bags, which are closed, after an error; also after one of closing them."""
+        """Remove the bags, which are closed, and a new folder after an error; also after one of closing them."""
         for path in self.paths if error else ():
             shutil.rmtree(path, ignore_errors=True)
+        if error and self._out and self._makes_out:
+            with suppress(OSError):  # another import may have written there
+                self._out.rmdir()

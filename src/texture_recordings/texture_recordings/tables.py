@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from texture_core.cli import progress
-from texture_core.config import parse_yaml
+from texture_core.config import parse_yaml, unknown_name
 from texture_core.errors import InvalidData, counted
 from texture_core.types import AnyArray, Array, ExplorationState, Phase, TactileSignal, checked_label
 from texture_recordings.bags import SlideBags, SlideStreams, is_bag, is_cut_off
@@ -37,6 +37,7 @@ from texture_recordings.mapping import (
 from texture_recordings.readers import (
     EXAMPLES,
     MAPPED,
+    MOST_COLUMNS,
     OTHER_KINDS,
     TableFrame,
     chosen,
@@ -67,6 +68,7 @@ STILL_S, STILL_ROWS, FEWEST_SINGLE = 0.1, 10, 0.1
 # A channel with more changes, of which a larger share go one way, is a clock or a counter: of 57 000 channels in public
 # sets at most 0.78 do but those of the time.
 CLOCK_CHANGES, ONE_WAY = 100, 0.9
+IN_NAMES = ('label', 'session', 'conditions')  # keys whose values names of files may hold
 FLAGS = {'true', 'false', 'yes', 'no', 'on', 'off'}
 CODE_NAME = re.compile(
     r'(?:sensor|finger|trial|run|rep|repeat|repetition|recording|session|pass|stroke)s?[ _-]?(?:id|no|nr|number)?'
@@ -306,6 +308,10 @@ class FrameSlides:
                     'those that all files have, or give each kind of file a mapping'
                 )
             self._used[name] = chosen(first, names, other)
+        lacking = [one for one, key in mapping.roles().items() if key in IN_NAMES and one not in self._frame.columns]
+        if lacking and '{' not in mapping.files + mapping.tables:
+            error = unknown_name(lacking[0], self._frame.columns, 'column', MOST_COLUMNS)
+            raise InvalidData(f"{error}; if names of files hold it, write files: '{{{lacking[0]}}}_{{run}}.csv', say")
         self._texts = {name: self._frame.texts(name) for name in mapping.texts()}
         numbers = [*(column for columns in self._used.values() for column in columns), *mapping.numbers()]
         self._numbers = {name: self._frame.numbers(name) for name in numbers}
@@ -414,13 +420,15 @@ class FrameSlides:
         # Of streams with a column of time, rows in which another one alone has a value are none of the slower one.
         kept, bad = np.ones(len(samples), dtype=bool), ~np.isfinite(samples).all(axis=1)
         untimed = np.zeros_like(bad)
-        for other in {column for one in self._used.values() for column in one} if params.time.column else ():
+        others = {column for one in self._used.values() for column in one} - {*names}
+        for other in others if params.time.column else ():
             if self._group(other) == group:
                 kept &= ~(np.isnan(samples).all(axis=1) & np.isfinite(self._numbers[other]))
         bad &= kept
         for row in np.flatnonzero(bad)[:EXAMPLES].tolist():
             column = names[int(np.argmin(np.isfinite(samples[row])))]
-            self._unknown.setdefault(self._line(row), f"column '{column}': no finite number (NaN, infinity or blank)")
+            reason = 'no finite number (NaN, infinity, blank or beyond 32 bits)'
+            self._unknown.setdefault(self._line(row), f"column '{column}': {reason}")
         if self._frame.junk is not None and len(self._frame.junk) == len(bad):
             bad |= self._frame.junk
             samples[self._frame.junk] = np.nan
