@@ -198,8 +198,10 @@ def test_a_recording_without_a_sample_is_reported_and_ends_with_code_2(tmp_path:
         reports = graph.listen(DiagnosticArray, '/diagnostics')
         command = [sys.executable, '-c', script, str(tmp_path / 'bag'), '--namespace', 'letf']
         with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as record:
-            graph.until(lambda: any(status.level == DiagnosticStatus.WARN for one in reports for status in one.status))
-            record.send_signal(signal.SIGINT)
+            try:
+                graph.until(lambda: any(one.level == DiagnosticStatus.WARN for all_ in reports for one in all_.status))
+            finally:
+                record.send_signal(signal.SIGINT)
             output = record.communicate(timeout=60.0)[1]
     assert record.returncode == 2, output
     sentence = "no sample came in the namespace '/letf', and sensors publish /left/signal; start the sensor"
