@@ -221,10 +221,12 @@ def read_rows(path: Path, columns: Sequence[str], what: str) -> list[tuple[int, 
         reader.fieldnames = names
         rows = [(reader.line_num, row) for row in reader]
     except (OSError, ValueError, csv.Error) as error:
-        raise InvalidData(f"'{path}' cannot be read: {error}; give a CSV file of {what}s") from error
+        reason = 'it is no text in UTF-8' if isinstance(error, UnicodeDecodeError) else error
+        raise InvalidData(f"'{path}' cannot be read: {reason}; give a CSV file of {what}s") from error
     if missing := [name for name in columns if name not in names]:
+        other = next((f"; it may separate by '{sign}': save it with commas" for sign in ';\t|' if sign in names[0]), '')
         raise InvalidData(
-            f"'{path}' has the columns {', '.join(names) or 'none'} but no {', '.join(missing)}; {needed}"
+            f"'{path}' has the columns {', '.join(names) or 'none'} but no {', '.join(missing)}{other}; {needed}"
         )
     if not rows:
         raise InvalidData(f"'{path}' holds no {what}; {needed}")

@@ -211,8 +211,20 @@ def test_impossible_splits_are_refused_with_a_sentence(splitter: object, groups:
         cross_validate(RECIPE, tones(), splitter, groups=groups)
 
 
+def test_bags_and_copies_of_slides_are_no_data_set(simulated: Path, tmp_path: Path) -> None:
+    for validate in (split_slides, lambda *given: cross_validate(RECIPE, *given)):
+        with pytest.raises(InvalidData, match=r"the data set is \['bags'\]; give a SlideDataset, such as"):
+            validate(['bags'], StratifiedKFold(2))
+    copied = list(np.random.default_rng(0).normal(size=(2, 2000, 1))) * 3
+    dataset = SlideDataset.from_arrays({'signal': copied}, ['cork', 'felt'] * 3, {'signal': 1000.0})
+    with pytest.raises(InvalidData, match="the slides 'cork/1' and 'cork/2' have the same samples; a copy is no"):
+        cross_validate(RECIPE, dataset, StratifiedKFold(3))
+    with pytest.raises(InvalidData, match=rf"\(in '{simulated}/\w+' and '{simulated}/\w+'\) have the same samples"):
+        train_from_bags('default', [simulated, simulated])
+
+
 def test_a_missing_force_or_speed_is_distinguished_from_other_values_that_are_not_finite() -> None:
-    signals = {'signal': [np.random.default_rng(0).normal(size=(600, 1)) for _ in range(6)]}
+    signals = {'signal': list(np.random.default_rng(0).normal(size=(6, 600, 1)))}
     for recipe, given, lacking in (('any-place', 'speed_m_s', 'force'), ('any-speed', 'force_n', 'speed')):
         dataset = SlideDataset.from_arrays(signals, ['cork', 'felt'] * 3, {'signal': 1000.0}, **{given: 0.5})
         with pytest.raises(InvalidData, match=f'4 of 4 slides came without {lacking}, which .*or take another recipe$'):

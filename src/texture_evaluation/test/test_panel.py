@@ -102,6 +102,7 @@ def test_other_scales_are_mapped_to_grades_and_empty_cells_are_missing(tmp_path:
     ('lines', 'sentence'),
     [
         (['rater,texture', 'a,cork'], 'no grade'),
+        (['rater;texture;grade', 'a;cork;1'], "but no .*; it may separate by ';': save it with commas"),
         (['rater,texture,grade'], 'holds no rating'),
         (['rater,texture,grade', 'a,cork,6', 'b,cork,1'], "line 2: the grade is '6'; a number from 1 to 5"),
         (['rater,texture,grade', 'a,cork,rough', 'b,cork,1'], "the grade is 'rough'"),
@@ -120,6 +121,9 @@ def test_ratings_that_cannot_be_used_get_a_sentence(lines: list[str], sentence: 
 def test_a_missing_file_and_a_scale_upside_down_get_a_sentence(tmp_path: Path) -> None:
     with pytest.raises(InvalidData, match='cannot be read'):
         read_ratings(tmp_path / 'none.csv')
+    (tmp_path / 'picture.png').write_bytes(b'\x89PNG')
+    with pytest.raises(InvalidData, match='cannot be read: it is no text in UTF-8; give a CSV file of ratings'):
+        read_ratings(tmp_path / 'picture.png')
     with pytest.raises(InvalidParameter, match='smooth end first'):
         read_ratings(write(tmp_path / 'r.csv', 'rater,texture,grade', 'a,cork,1'), (5.0, 1.0))
 

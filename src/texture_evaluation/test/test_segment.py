@@ -1,13 +1,16 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from texture_core.cli import Parser
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.types import Phase
 from texture_features.segmentation import SegmentationParams
 from texture_recordings.bags import BagWriter, read_bag
-from texture_recordings.commands.convert import segment_bags
+from texture_recordings.commands.convert import segment, segment_bags
 from texture_recordings.slides import find_slides
 from texture_simulation.offline import SlidePlan, write_simulated
 
@@ -56,6 +59,27 @@ def test_a_bag_with_labelled_slides_is_refused_and_keeps_them(bag, tmp_path):
     with pytest.raises(InvalidData, match=f"'{bag}' has slides already, the first over '{SURFACE}'; use it as it is"):
         segment_bags([bag], tmp_path / 'found', SegmentationParams(), 'oak')
     assert not (tmp_path / 'found').exists()
+
+
+def test_bags_without_a_slide_are_refused_and_one_of_several_is_named(bag, tmp_path, capsys):
+    bare, quiet = without_states(bag, tmp_path / 'bare'), tmp_path / 'quiet'
+    with BagWriter(quiet) as writer:
+        for topic, log_ns, value in read_bag(bag, ('signal',)):
+            writer.write(topic, replace(value, samples=np.zeros_like(value.samples)), log_ns)
+    with pytest.raises(InvalidData, match='no slide was found at a power of 6 times that of rest, longer'):
+        segment_bags(quiet, tmp_path / 'found', SegmentationParams(), 'oak')
+    assert not (tmp_path / 'found').exists()
+    parser = Parser()
+    segment.configure(parser)
+    options = ['--out', str(tmp_path / 'found'), '--surface', 'oak']
+    assert segment.run(parser.parse_args([str(bare), str(quiet), *options])) == 0
+    assert 'bare: 3 slides\n' in (printed := capsys.readouterr().out)
+    assert 'quiet: 0 slides; lower --on and --off, or --ramp-s' in printed
+
+
+def test_a_slide_does_not_end_above_the_power_at_which_it_starts():
+    with pytest.raises(InvalidParameter, match="'off' is 5 and 'on' is 1; a slide ends below"):
+        SegmentationParams(on=1.0, off=5.0)
 
 
 def test_nothing_stays_on_a_disk_that_is_too_small(bag, tmp_path, fill_disk):

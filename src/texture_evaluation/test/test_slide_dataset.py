@@ -71,6 +71,13 @@ def test_features_are_those_of_each_window_and_of_its_time() -> None:
     assert np.diff(features.start_ns[3:6]).tolist() == [NANOSECONDS // 4] * 2
 
 
+@pytest.mark.parametrize('feature_set', ['default', None, load_recipe('default')])
+def test_what_is_no_feature_set_is_refused_with_where_there_is_one(feature_set: object) -> None:
+    for windows in (from_arrays().windows, from_arrays().vectors, from_arrays().features):
+        with pytest.raises(InvalidData, match=r'the feature set is a .*; give that of a model'):
+            list(windows(feature_set))
+
+
 def test_slides_are_selected_by_number_label_and_condition() -> None:
     dataset = from_arrays()
     assert dataset.select('2-3').names.tolist() == ['cork/2', 'felt/2', 'cork/3', 'felt/3']
@@ -107,9 +114,14 @@ def test_each_slide_has_its_conditions(condition: str, expected: list) -> None:
     [
         (({'signal': arrays()[:5]}, LABELS, {'signal': RATE_HZ}), "'signal' has 5 slides"),
         (({'signal': arrays()}, LABELS, {}), 'the rates are {}; give one array'),
+        (({'signal': arrays()}, LABELS, {'signal': '1000'}), "the rates are {'signal': '1000'}; give one array"),
         (({'signal': arrays()}, LABELS, 1000.0), 'signals and rates_hz are by topic'),
         (({'signal': arrays()}, 'corkfe', {'signal': RATE_HZ}), 'has 6 slides for 1 labels'),
         (({'signal': arrays()}, [*LABELS[:5], ' '], {'signal': RATE_HZ}), 'slide 6 has an empty label'),
+        *(
+            (({'signal': arrays()}, [*LABELS[:5], none], {'signal': RATE_HZ}), 'slide 6 has an empty label')
+            for none in (None, math.nan, np.float32('nan'))
+        ),
         (({'signal': arrays()}, ['a/b', *LABELS[1:]], {'signal': RATE_HZ}), "the label 'a/b' has a slash"),
         *(
             (({'signal': [bad, *arrays()[1:]]}, LABELS, {'signal': RATE_HZ}), f"'signal' of slide 1 has .*{sentence}")

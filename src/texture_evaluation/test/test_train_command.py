@@ -148,7 +148,8 @@ def test_a_stream_that_is_not_tared_as_the_recipe_states_is_reported(tared, faul
 
 
 def test_training_names_the_slides_that_it_cannot_count_as_evaluation_does(tmp_path, monkeypatch) -> None:
-    samples = [np.random.default_rng(0).normal(size=(length, 1)) for length in [1500] * 7 + [200]]
+    rng = np.random.default_rng(0)
+    samples = [rng.normal(size=(length, 1)) for length in [1500] * 7 + [200]]
     slides = SlideDataset.from_arrays({'signal': samples}, ['cork', 'felt'] * 4, {'signal': 1000.0}, speed_m_s=0.05)
     monkeypatch.setattr(SlideDataset, 'from_bags', lambda *_, **__: slides)
     (tmp_path / 'mine.yaml').write_text('{learner: discriminant, inputs: {signal: {features: [mean]}}}')

@@ -32,7 +32,7 @@ from texture_estimation.training import train
 from texture_evaluation import metrics
 from texture_evaluation.charts import COLOURS, chart, line_styles
 from texture_evaluation.metrics import SlideResult, curve
-from texture_evaluation.train import training_examples, unusable
+from texture_evaluation.train import slide_digests, training_examples, unusable
 from texture_features.feature_set import LabelledFeatures
 from texture_recordings.dataset import CONDITIONS, SlideDataset
 
@@ -540,7 +540,7 @@ def split_slides(
     """
     if not hasattr(splitter, 'split') or isinstance(splitter, str):
         raise InvalidData(f'the splitter is {splitter!r}; give one of scikit-learn, such as StratifiedKFold(5)')
-    labels, columns = dataset.labels, slide_groups(dataset, groups)
+    columns, labels = slide_groups(dataset, groups), dataset.labels
     if type(splitter).__name__.startswith('Stratified'):
         _check_folds(labels, getattr(splitter, 'n_splits', 1))
     if isinstance(splitter, LeaveOneGroupOut) and len(np.unique(columns)) < 2:
@@ -606,6 +606,8 @@ def _check_folds(labels: AnyArray, folds: int) -> None:
 
 def slide_groups(dataset: SlideDataset, groups: str | AnyArray) -> AnyArray:
     """Return the group of each slide."""
+    if not isinstance(dataset, SlideDataset):
+        raise InvalidData(f'the data set is {dataset!r:.80}; give a SlideDataset, such as SlideDataset.from_bags(bags)')
     if isinstance(groups, str):
         wholes = np.array([slide.whole_name for slide in dataset])
         return wholes if groups == 'slide' else dataset.condition(groups)
@@ -657,8 +659,8 @@ def cross_validate(
     Raises
     ------
     InvalidData
-        If a split is impossible, no slide has a window, a fold has fewer than two surfaces to train on, or no surface
-        is tested where it is trained.
+        If two slides have the same samples, a split is impossible, no slide has a window, a fold has fewer than two
+        surfaces to train on, or no surface is tested where it is trained.
 
     Examples
     --------
@@ -670,6 +672,7 @@ def cross_validate(
     """
     recipe = load_recipe(recipe) if isinstance(recipe, str) else recipe
     columns = slide_groups(dataset, groups)
+    slide_digests(dataset)
     splits = split_slides(dataset, splitter, groups)
     requested = {row for _, test in splits for row in test.tolist()}
     splits = of_trained_surfaces(dataset.labels, splits, sessions=isinstance(groups, str) and groups == 'session')

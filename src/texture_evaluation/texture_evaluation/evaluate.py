@@ -25,7 +25,7 @@ from texture_evaluation.cross_validation import (
     figures,
 )
 from texture_evaluation.metrics import SlideResult
-from texture_evaluation.train import not_counted, slide_digest
+from texture_evaluation.train import not_counted, slide_digests
 from texture_features.feature_set import fingerprint_difference
 from texture_features.windows import WindowEvent
 from texture_recordings.dataset import SlideDataset, no_window
@@ -115,6 +115,7 @@ def evaluate(
 
 def evaluate_dataset(model: TextureModel, dataset: SlideDataset) -> EvaluationReport:
     """Return how a model does on labelled slides."""
+    by_digest = slide_digests(dataset)
     tested = {slide: _test(model, slide, events) for slide, events in dataset.windows(model.recipe.feature_set)}
     results = {slide: result for slide, (result, _) in tested.items() if result.estimates}
     if not results:
@@ -129,7 +130,7 @@ def evaluate_dataset(model: TextureModel, dataset: SlideDataset) -> EvaluationRe
         unusable=tuple(slide.name for slide in tested if slide not in results),
         tare_faults=tuple(dataset.tare_faults(model.recipe.feature_set)),
         shift=f'{bags_compared([(sessions, [slide.session for slide in results])])}; {NO_PLACE}',
-        slides_in_training=tuple(slide.name for slide in results if slide_digest(slide) in digests),
+        slides_in_training=tuple(slide.name for one, slide in by_digest.items() if one in digests and slide in results),
         too_little_training=model.acceptance.reason,
         clusters=[one.name if one.session in sessions else f'{one.surface} {one.session}' for one in known],
     )

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from texture_core.cli import task
 from texture_core.config import writing
-from texture_core.errors import counted
+from texture_core.errors import InvalidData, counted
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.roughness import RoughnessModel, load_roughness_recipe, read_grades, train_grades
@@ -51,6 +51,7 @@ def train_from_bags(
     """
     plan = load_recipe(recipe)
     dataset = SlideDataset.from_bags(bags, slides, namespace, topics=plan.feature_set.topics)
+    digests = sorted(slide_digests(dataset))
     examples = training_examples(plan, dataset)
     with task(f"fitting '{plan.name}' to {len(examples.y)} windows"):
         model = train(plan, examples, _name(out, plan.name))
@@ -61,7 +62,7 @@ def train_from_bags(
     )
     trained_on = {
         'sessions': sorted({slide.session for slide in dataset}),
-        'slide_digests': sorted(map(slide_digest, dataset)),
+        'slide_digests': digests,
         'samples': most,
         'unusable': not_counted(unusable(dataset, examples)),
     }
@@ -84,6 +85,7 @@ def train_grades_from_bags(
     plan, table = load_roughness_recipe(recipe), read_grades(grades)
     windows = replace(plan.feature_set, windows=plan.training_windows)
     dataset = SlideDataset.from_bags(bags, slides, namespace, topics=windows.topics)
+    slide_digests(dataset)
     examples = dataset.features(windows)
     with task(f"fitting '{plan.name}' to {len(examples.y)} windows"):
         model = train_grades(plan, examples, table, _name(out, plan.name))
@@ -119,6 +121,20 @@ def slide_digest(slide: LabelledSlide) -> str:
         for batch in batches:
             digest.update(batch.samples.tobytes())
     return digest.hexdigest()[:12]
+
+
+def slide_digests(dataset: SlideDataset) -> dict[str, LabelledSlide]:
+    """Return slides by their digests; InvalidData if two have the same samples: one would test what another trains."""
+    found: dict[str, LabelledSlide] = {}
+    for slide in dataset:
+        other = found.setdefault(slide_digest(slide), slide)
+        if other is not slide and any(slide.signals.values()):
+            where = f" (in '{other.bag}' and '{slide.bag}')" if slide.session else ''
+            raise InvalidData(
+                f"the slides '{other.name}' and '{slide.name}'{where} have the same samples; a copy is no further "
+                'slide, so give each bag or array once'
+            )
+    return found
 
 
 def _name(out: str | Path | None, recipe: str) -> str:

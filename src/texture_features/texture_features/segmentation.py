@@ -12,6 +12,7 @@ from scipy.ndimage import percentile_filter, uniform_filter1d
 from scipy.signal import savgol_filter
 
 from texture_core.config import param
+from texture_core.errors import InvalidParameter
 from texture_core.types import NANOSECONDS, Array, ExplorationState, Phase, Samples, TactileSignal
 from texture_features.windows import SampleBuffer
 
@@ -45,6 +46,13 @@ class SegmentationParams:
         'Baseline noise of the sensor, rms; 0 estimates it from the quietest tenth of the recording.',
         low=0.0,
     )
+
+    def __post_init__(self) -> None:
+        if self.off > self.on:
+            raise InvalidParameter(
+                f"'off' is {self.off:g} and 'on' is {self.on:g}; a slide ends below the power at which it starts: give "
+                "an 'off' of at most 'on'"
+            )
 
 
 def cell_power(samples: Samples, rate_hz: float) -> Array:

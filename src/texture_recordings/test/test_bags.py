@@ -172,6 +172,9 @@ def test_a_missing_bag_a_foreign_folder_and_a_foreign_file_are_refused_with_a_se
     for foreign in (tmp_path, tmp_path / 'notes.txt'):
         with pytest.raises(InvalidData, match='is not a bag; a folder'):
             list(read_bag(foreign))
+    (tmp_path / 'notes.txt').rename(tmp_path / 'notes.mcap')
+    with pytest.raises(InvalidData, match='it is no MCAP file, whatever its name'):
+        list(read_bag(tmp_path / 'notes.mcap'))
 
 
 def test_a_batch_of_many_channels_at_a_high_rate_is_read_as_it_was_written(tmp_path: Path) -> None:
@@ -254,6 +257,22 @@ def test_a_bag_with_fewer_messages_than_it_declares_is_refused_until_its_metadat
         list(read_bag(bag))
     (bag / 'metadata.yaml').unlink()
     assert len(list(read_bag(bag))) == 10
+
+
+def test_with_metadata_that_were_cut_off_or_garbled_the_file_is_read_alone(tmp_path: Path) -> None:
+    bag = write(tmp_path / 'bag')
+    metadata = bag / 'metadata.yaml'
+    whole = metadata.read_bytes()
+    for content in [whole[:size] for size in range(0, whole.index(b'relative_file_paths'), 20)] + [b'\x89', b'- 1']:
+        metadata.write_bytes(content)
+        assert len(list(read_bag(bag))) == 200
+    (bag / 'bag.mcap').rename(bag / 'other.mcap')
+    (bag / 'more.mcap').write_bytes(b'')
+    with pytest.raises(InvalidData, match=r'its metadata\.yaml is damaged; make it again: ros2 bag reindex'):
+        list(read_bag(bag))
+    metadata.write_bytes(whole)
+    with pytest.raises(InvalidData, match=r"its file 'bag\.mcap' is missing; copy it there, or use the rest: ros2"):
+        list(read_bag(bag))
 
 
 def test_a_last_chunk_whose_content_never_reached_the_disk_is_left_out(tmp_path: Path) -> None:

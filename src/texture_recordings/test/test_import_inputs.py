@@ -51,6 +51,7 @@ def check(folder: Path, write: Write, content: dict, truth: Truth, kind: str = '
     if isinstance(truth, str):
         with pytest.raises(InvalidData, match=truth):
             import_tables(mapping, folder / 'in', folder / 'bags', MAPPED[kind])
+        assert not (folder / 'bags').exists()
         return
     dataset = SlideDataset.from_bags(import_tables(mapping, folder / 'in', folder / 'bags', MAPPED[kind]).bags)
     assert sorted(dataset.labels) == [label for label, _ in truth]
@@ -161,6 +162,13 @@ CLOCKS: dict[str, tuple[Write, dict, Truth]] = {
     'a slide of hours': (
         csv(np.random.default_rng(3).normal(size=9600).round(4), names='x'),
         {'streams': {'signal': {'columns': ['x'], 'rate_hz': 5}}}, 'lasts 1[.]?92',
+    ),
+    'numbers that no bag can hold': (
+        csv(T, np.where(np.arange(N) % 5, X, 1e300)), {},
+        r"120 malformed rows of 600, first row 2, column 'x': no finite number .NaN, infinity, blank or beyond 32 b",
+    ),
+    'files without a template': (
+        csv(T, X), {'files': '*'}, r"no column 'material'. Known: t, x; if .*, write files: '\{material\}_\{run\}.csv'",
     ),
     'an open brace': (csv(T, X), {'files': '{material}_{run.csv'}, "has a '{' that belongs to no field"),
     'a rate below all': (
@@ -824,7 +832,11 @@ CONTAINERS: dict[str, tuple[Write, dict, Truth]] = {
     'an array on its side': (
         npz(**{'1/a': np.c_[T, 0.06 + 0.01 * X, 0.05 + 0.01 * X, 0.1 + 0.01 * Y].T}),
         {**ANY, **numbered('1-3'), 'tables': '{i}/a'},
-        r"'0': time goes back .*; if the array lies on its side, write format: \{transpose: true\}",
+        r"'0': time goes back .*: if the array lies on its side, write format: \{transpose: true\}",
+    ),
+    'an array on its side whose first samples grow': (
+        npz(**{'1/a': np.c_[T, 1.4 + 0.01 * X, 2.8 + 0.01 * Y].T}), {**ANY, **numbered('1-2'), 'tables': '{i}/a'},
+        r'has 3 rows and 600 columns: if the array lies .*transpose: true\}; the rate of .* by its times; give a col',
     ),
     'sounds of two rates': (
         both(*(lambda folder, hz=hz: wavfile.write(folder / f'cork_{hz}.wav', hz, X) for hz in (8000, 9000))), SOUND,
@@ -1015,6 +1027,11 @@ def test_bags(tmp_path: Path, name: str) -> None:
     label = {'label': {'column': '/surface/data'}, 'slides': {'by': 'column', 'column': '/surface/data'}}
     streams = {'signal': {'columns': ['/p/point.x']}}
     check(tmp_path, write, {'files': '{a}_{run}', 'streams': streams, **label}, truth, 'bag')
+
+
+def test_a_pattern_behind_a_topic_without_a_slash_is_no_field_of_it(tmp_path: Path) -> None:
+    content = {'streams': {'signal': {'columns': ['/p.*']}}, 'files': '*', 'label': {'value': 'cork'}}
+    check(tmp_path, bag(), content, r"'/p\.\*' names no field of the topic '/p'; write columns as topic and", 'bag')
 
 
 def test_one_of_several_frames_is_chosen(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2.metadata import parse_qos
@@ -186,6 +187,25 @@ def test_topics_in_the_namespace_of_another_explorer_are_not_recorded(tmp_path) 
             graph.until(is_written)
             assert record.stop(signal.SIGINT) == 0, record.output
     assert {name for name in topics() if name.endswith('signal')} == {'/signal', '/finger1/signal'}
+
+
+def test_a_recording_without_a_sample_is_reported_and_ends_with_code_2(tmp_path: Path) -> None:
+    script = 'from texture_core.cli import Parser, run_program; from texture_recordings.commands.play import record; '
+    script += 'parser = Parser(); record.configure(parser); options = parser.parse_args(); '
+    script += 'raise SystemExit(run_program(lambda: record.run(options)))'
+    with LocalGraph(100, deadline_s=60.0) as graph:
+        graph.peer.create_publisher(msg.TactileSignal, '/left/signal', SENSOR_QOS)
+        reports = graph.listen(DiagnosticArray, '/diagnostics')
+        command = [sys.executable, '-c', script, str(tmp_path / 'bag'), '--namespace', 'letf']
+        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as record:
+            try:
+                graph.until(lambda: any(one.level == DiagnosticStatus.WARN for all_ in reports for one in all_.status))
+            finally:
+                record.send_signal(signal.SIGINT)
+            output = record.communicate(timeout=60.0)[1]
+    assert record.returncode == 2, output
+    sentence = "no sample came in the namespace '/letf', and sensors publish /left/signal; start the sensor"
+    assert output.count(sentence) == 3  # as it is recorded, in the last line of the log, and as the error
 
 
 @pytest.mark.parametrize(

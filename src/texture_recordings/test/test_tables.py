@@ -123,7 +123,7 @@ def test_a_condition_of_which_over_a_tenth_are_no_numbers_is_refused(tmp_path: P
 
 def test_of_too_many_rows_without_a_number_the_first_one_is_named(tmp_path: Path, mapping: TableMapping) -> None:
     broken = {row: f'{5000000 + 10 * row}.00;stroke 1;1.0;nan;2.0;150.0' for row in range(4, 100)} | {50: 'cut'}
-    fault = r"96 malformed rows of 910, first row 7, column 'acc_y': no finite number \(NaN, infinity or blank\)"
+    fault = r"96 malformed rows of 910, first row 7, column 'acc_y': no finite number \(NaN, infinity, blank or beyond"
     with pytest.raises(InvalidData, match=fault):
         run(tmp_path, mapping, broken)
 
@@ -253,7 +253,7 @@ def test_an_import_that_fails_leaves_no_half_of_it(tmp_path: Path, mapping: Tabl
     (folder / f'{recorded[-1].name}.csv').write_text('t;phase;acc_x\n1;rest;2\n')
     with pytest.raises(InvalidData, match=r"no column 'acc_y'|no column 'grip'"):
         import_tables(mapping, folder, tmp_path / 'out')
-    assert list((tmp_path / 'out').iterdir()) == []
+    assert not (tmp_path / 'out').exists()
 
 
 def one_channel(**content: object) -> TableMapping:

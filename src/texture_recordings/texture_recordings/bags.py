@@ -14,7 +14,7 @@ import struct
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import replace
 from functools import cache, partial
 from itertools import accumulate, pairwise
@@ -25,7 +25,17 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.config import MB, FileRefused, folder, open_regular, parse_yaml, read_text, writing
+from texture_core.config import (
+    MB,
+    PARSE_ERRORS,
+    FileRefused,
+    folder,
+    open_regular,
+    parse_yaml,
+    read_bounded,
+    read_text,
+    writing,
+)
 from texture_core.errors import InvalidData, InvalidParameter, MissingLibrary, TextureError
 from texture_core.types import (
     DATA_CLASSES,
@@ -134,6 +144,8 @@ class CheckedPath(type(Path())):  # type: ignore[misc]
     def open(self, *_args: Any, **_options: Any) -> IO[Any]:
         """Open an MCAP file for reading bytes, one without its end up to its last whole chunk."""
         file = _Records(cast('io.BufferedReader', open_regular(self, None)).detach())
+        if not MAGIC.startswith(file.read(len(MAGIC))):
+            raise FileRefused('it is no MCAP file, whatever its name; give one that a recorder wrote')
         small = file.seek(0, io.SEEK_END) < 50 * MB  # a larger one takes as much memory anyway
         whole = _has_end(file)
         if whole and not small:
@@ -419,18 +431,27 @@ def is_bag(path: Path) -> bool:
 
 
 def _cut_off_file(path: Path) -> Path | None:
-    """Return the one file of a bag whose recorder could not write the metadata, or left out how it is stored."""
+    """Return the one file of a bag without whole metadata, or whose metadata leave out how it is stored."""
     if not path.is_dir():
         return None
     if os.path.lexists(path / 'metadata.yaml'):
         try:
-            text = CheckedPath(path / 'metadata.yaml').read_text()
-        except (OSError, ValueError):
-            return None
-        if text.strip() and not re.search(r'^\s*storage_identifier:\s*(""|\'\')?\s*$', text, re.MULTILINE):
+            if _metadata(path).get('storage_identifier'):
+                return None
+        except (OSError, FileRefused):
             return None
     files = list(path.glob('*.mcap'))
     return files[0] if len(files) == 1 else None
+
+
+def _metadata(path: Path) -> dict[str, Any]:
+    """Return what metadata.yaml states of a bag, nothing if it is damaged."""
+    content = read_bounded(path / 'metadata.yaml', MAX_METADATA_BYTES)
+    try:
+        facts: dict[str, Any] = parse_yaml(content.decode())['rosbag2_bagfile_information']
+        return facts if facts['relative_file_paths'] else {}
+    except PARSE_ERRORS:
+        return {}
 
 
 def is_cut_off(path: Path) -> bool:
@@ -597,12 +618,17 @@ def _files(path: Path) -> list[Path]:
     """Return the files of a bag."""
     if not path.is_dir():
         return [path]
-    facts = parse_yaml((path / 'metadata.yaml').read_text(encoding='utf-8'))['rosbag2_bagfile_information']
+    facts = _metadata(path)
+    if not facts:
+        raise FileRefused('its metadata.yaml is damaged; make it again: ros2 bag reindex')
     mode = str(facts.get('compression_mode', '')).lower()
     if mode in {'file', 'message'}:
         raise FileRefused(f'it is compressed by {mode}, and storage alone is read so; unpack it by ros2 bag convert')
     # As rosbags finds them: next to the metadata, whatever folder the entry names.
-    return [path / Path(str(name)).name for name in facts['relative_file_paths']]
+    files = [path / Path(str(name)).name for name in facts['relative_file_paths']]
+    if missing := [file.name for file in files if not file.exists()]:
+        raise FileRefused(f"its file '{missing[0]}' is missing; copy it there, or use the rest: ros2 bag reindex")
+    return files
 
 
 # --------------------
@@ -790,6 +816,7 @@ class SlideBags:
 
     def __init__(self, out: str | Path | None) -> None:
         self._out = None if out is None else Path(out)
+        self._makes_out = self._out is not None and not self._out.exists()
         self._open = ExitStack()
         self._open.push(self._remove)
         self._bags: dict[str, BagWriter] = {}
@@ -846,6 +873,9 @@ class SlideBags:
         self._open.__exit__(*error)
 
     def _remove(self, error: type[BaseException] | None, *_: object) -> None:
-        """Remove the bags, which are closed, after an error; also after one of closing them."""
+        """Remove the bags, which are closed, and a new folder after an error; also after one of closing them."""
         for path in self.paths if error else ():
             shutil.rmtree(path, ignore_errors=True)
+        if error and self._out and self._makes_out:
+            with suppress(OSError):  # another import may have written there
+                self._out.rmdir()

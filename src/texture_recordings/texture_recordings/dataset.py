@@ -8,6 +8,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +28,7 @@ from texture_core.types import (
     Window,
     checked_label,
 )
-from texture_features.feature_set import ONE_RATE, LabelledFeatures
+from texture_features.feature_set import ONE_RATE, FeatureSet, LabelledFeatures
 from texture_features.windows import CutWindow, WindowEvent, cut_recording
 from texture_recordings.bags import BagPaths, is_bag, short_name, topics_in
 from texture_recordings.mapping import CONDITION_COLUMNS, SlideBorders, plausible
@@ -46,13 +47,13 @@ from texture_recordings.slides import (
 
 if TYPE_CHECKING:
     from texture_features.augmentation import Augmentation
-    from texture_features.feature_set import FeatureSet
 
 
 # --------------------
 # Labelled slides with their signals: read once from bags, or given as arrays.
 
 HOPS = 4  # windows of the least distance overlap so often
+NO_LABEL = ('None', 'nan', 'NaT', '<NA>')  # as texts of values that are none
 GAP_NS = NANOSECONDS  # between two slides that are given as arrays
 # Speeds and forces that differ by less are one condition: an arm deviates from its request.
 SAME_RATIO, SAME_RAD = 1.05, 0.1
@@ -162,12 +163,14 @@ class SlideDataset:
         """
         if not (isinstance(signals, Mapping) and isinstance(rates_hz, Mapping)):
             raise InvalidData("signals and rates_hz are by topic: {'signal': [...]} and {'signal': 1000.0}")
-        surfaces = [checked_label(str(label)) for label in ([labels] if isinstance(labels, str) else labels)]
+        given = [labels] if isinstance(labels, str) else labels
+        texts = [one if isinstance(one, str) else '' if str(one) in NO_LABEL else str(one) for one in given]
+        surfaces = [checked_label(text) for text in texts]
         if not all(surfaces):
             raise InvalidData(f'slide {surfaces.index("") + 1} has an empty label; give the surface of each')
         count = len(surfaces)
         for topic, arrays in signals.items():
-            if len(arrays) != count or topic not in rates_hz:
+            if len(arrays) != count or not isinstance(rates_hz.get(topic), Real):
                 raise InvalidData(
                     f"'{topic}' has {len(arrays)} slides for {count} labels, and the rates are {rates_hz}; give one "
                     "array (n_samples, n_channels) for each label, and the rate of each topic, such as {'signal': 2e3}"
@@ -375,6 +378,7 @@ class SlideDataset:
         ModelMismatch
             If a slide has nothing of an input.
         """
+        _check(feature_set)
         for slide in progress(self.slides, 'computing features of slides', len(self)):
             yield slide, cut_slide(slide, feature_set)
 
@@ -416,6 +420,7 @@ class SlideDataset:
         ModelMismatch
             If a slide lacks an input, or the slides differ in rates or channels.
         """
+        _check(feature_set)
         augmenter = None
         if augmentation is not None and augmentation.copies:
             from texture_features.augmentation import Augmenter  # noqa: PLC0415  # needs scipy
@@ -509,6 +514,14 @@ class SlideDataset:
             If a slide has no samples of the topic or lost some.
         """
         return [slide.samples for slide in self.samples(topic)], self.labels
+
+
+def _check(feature_set: object) -> None:
+    if not isinstance(feature_set, FeatureSet):
+        raise InvalidData(
+            f'the feature set is a {type(feature_set).__name__}; give that of a model, model.recipe.feature_set, or '
+            "FeatureSet.load('default')"
+        )
 
 
 def cut_slide(slide: LabelledSlide, feature_set: FeatureSet) -> list[WindowEvent]:

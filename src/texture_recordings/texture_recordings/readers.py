@@ -16,7 +16,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from itertools import chain, islice
+from itertools import chain, islice, product
 from pathlib import Path
 from typing import Any
 
@@ -761,10 +761,12 @@ def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
         stamp_ns = _stamp_ns(getattr(getattr(value, 'header', None), 'stamp', None), name)
         stamps.setdefault(name, []).append((stamp_ns or message.log_ns, message.log_ns))
     if not rows:
-        raise InvalidData(
-            f'it has no topic that the mapping names ({", ".join(sorted(wanted))}); it has '
-            f"{', '.join(sorted(seen)) or 'none'}; write columns as topic and field, such as '/wrench/wrench.force.x'"
-        )
+        has = ', '.join(sorted(seen)) or 'none'
+        fault = f'it has no topic that the mapping names ({", ".join(sorted(wanted))}); it has {has}'
+        for name, topic in product(sorted(wanted), seen):
+            if re.match(re.escape(topic) + r'(?![\w/])', name):
+                fault = f"'{name}' names no field of the topic '{topic}'"
+        raise InvalidData(f"{fault}; write columns as topic and field, such as '/wrench/wrench.force.x'")
     times_ns = _by_one_clock({name: np.array(pairs) for name, pairs in stamps.items()})
     begin_ns = next(iter(times_ns.values()))[0]
     columns: dict[str, AnyArray] = {}

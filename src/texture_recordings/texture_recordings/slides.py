@@ -233,6 +233,8 @@ STREAMS = ('signal', 'signal_static')
 
 def parse_selection(text: str) -> frozenset[int] | None:
     """Return the numbers in '1-30' or '1,3,5-7'; None, meaning all, for ''."""
+    if not isinstance(text, str):
+        raise InvalidData(f"slides are {text!r}; a text is needed, such as '1-30' or '1,3,5-7'")
     if not text.strip():
         return None
     numbers: set[int] = set()

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from texture_core.cli import progress
-from texture_core.config import parse_yaml
+from texture_core.config import parse_yaml, unknown_name
 from texture_core.errors import InvalidData, counted
 from texture_core.types import AnyArray, Array, ExplorationState, Phase, TactileSignal, checked_label
 from texture_recordings.bags import SlideBags, SlideStreams, is_bag, is_cut_off
@@ -37,6 +37,7 @@ from texture_recordings.mapping import (
 from texture_recordings.readers import (
     EXAMPLES,
     MAPPED,
+    MOST_COLUMNS,
     OTHER_KINDS,
     TableFrame,
     chosen,
@@ -54,6 +55,7 @@ MOST_ROUNDING, NO_CHANGE = 0.01, 1e-12  # of the standard deviation, and of the 
 SAME_TIME_S = 1e-9
 MAX_LEFT_OUT = 0.1  # share of the rows
 MAX_NUMBERED = 3  # columns name_1 … name_n beyond this may be samples: the mapping has to tell
+FEW_ROWS = 3  # whose intervals tell no unit
 ROWS_A_CODE = 2  # at least, of a column that may name sensors, trials or runs
 MANY_TEXTS = 50  # different ones are no codes
 # Ratios of successive steps of a channel that make a word, of which a fifth may come twice; words that a slide keeps.
@@ -66,6 +68,7 @@ STILL_S, STILL_ROWS, FEWEST_SINGLE = 0.1, 10, 0.1
 # A channel with more changes, of which a larger share go one way, is a clock or a counter: of 57 000 channels in public
 # sets at most 0.78 do but those of the time.
 CLOCK_CHANGES, ONE_WAY = 100, 0.9
+IN_NAMES = ('label', 'session', 'conditions')  # keys whose values names of files may hold
 FLAGS = {'true', 'false', 'yes', 'no', 'on', 'off'}
 CODE_NAME = re.compile(
     r'(?:sensor|finger|trial|run|rep|repeat|repetition|recording|session|pass|stroke)s?[ _-]?(?:id|no|nr|number)?'
@@ -305,6 +308,10 @@ class FrameSlides:
                     'those that all files have, or give each kind of file a mapping'
                 )
             self._used[name] = chosen(first, names, other)
+        lacking = [one for one, key in mapping.roles().items() if key in IN_NAMES and one not in self._frame.columns]
+        if lacking and '{' not in mapping.files + mapping.tables:
+            error = unknown_name(lacking[0], self._frame.columns, 'column', MOST_COLUMNS)
+            raise InvalidData(f"{error}; if names of files hold it, write files: '{{{lacking[0]}}}_{{run}}.csv', say")
         self._texts = {name: self._frame.texts(name) for name in mapping.texts()}
         numbers = [*(column for columns in self._used.values() for column in columns), *mapping.numbers()]
         self._numbers = {name: self._frame.numbers(name) for name in numbers}
@@ -413,13 +420,15 @@ class FrameSlides:
         # Of streams with a column of time, rows in which another one alone has a value are none of the slower one.
         kept, bad = np.ones(len(samples), dtype=bool), ~np.isfinite(samples).all(axis=1)
         untimed = np.zeros_like(bad)
-        for other in {column for one in self._used.values() for column in one} if params.time.column else ():
+        others = {column for one in self._used.values() for column in one} - {*names}
+        for other in others if params.time.column else ():
             if self._group(other) == group:
                 kept &= ~(np.isnan(samples).all(axis=1) & np.isfinite(self._numbers[other]))
         bad &= kept
         for row in np.flatnonzero(bad)[:EXAMPLES].tolist():
             column = names[int(np.argmin(np.isfinite(samples[row])))]
-            self._unknown.setdefault(self._line(row), f"column '{column}': no finite number (NaN, infinity or blank)")
+            reason = 'no finite number (NaN, infinity, blank or beyond 32 bits)'
+            self._unknown.setdefault(self._line(row), f"column '{column}': {reason}")
         if self._frame.junk is not None and len(self._frame.junk) == len(bad):
             bad |= self._frame.junk
             samples[self._frame.junk] = np.nan
@@ -465,10 +474,16 @@ class FrameSlides:
             )
 
     def _fault(self, column: str, row: int, reason: object) -> InvalidData:
-        wide = self._frame.lines is None and self._frame[column].size < len(self._frame.columns)
-        if wide and isinstance(reason, ClockFault):
-            reason = f'{reason}; if the array lies on its side, write format: {{transpose: true}}'
+        if isinstance(reason, ClockFault) and (side := self._side(column)):
+            reason = f'{reason}; {side}'
         return InvalidData(f"row {self._line(row)}, column '{column}': {reason}")
+
+    def _side(self, column: str) -> str:
+        """Return that the array of a column may lie on its side, '' if it has no more columns than rows."""
+        rows, columns = self._frame[column].size, sum(one.ndim for one in self._frame.columns.values())
+        wide = self._frame.lines is None and not self._frame.clocks and rows < columns
+        shape = f'it has {rows} rows and {columns} columns'
+        return f'{shape}: if the array lies on its side, write format: {{transpose: true}}' * wide
 
     def _check_malformed(self) -> None:
         """Count malformed rows of streams and cells of conditions; InvalidData if they are too many."""
@@ -553,7 +568,8 @@ class FrameSlides:
     def _rated(self, stream: Stream) -> Stream:
         """Return a stream with the rate of its rows: as stated, else by its times, which must agree."""
         name, params, per_row = stream.name, stream.params, stream.per_row
-        measured = self._frame.rate_hz
+        measured, side = self._frame.rate_hz, self._side(self._used[name][0])
+        first = f'{side}; ' if side else ''
         if stream.time_s is not None:
             steps = np.diff(stream.time_s)
             if stream.group == self._reference.group and self._mapping.slides.by != 'row':
@@ -563,8 +579,8 @@ class FrameSlides:
             measured = per_row * estimated(steps)
             if not measured or np.count_nonzero(steps < 0) > CLOCK_CHANGES:
                 raise InvalidData(
-                    f"the times of '{name}' do not grow from row to row; if rows are out of order, sort them by time, "
-                    'else give a column of time that grows and has enough digits, or `rate_hz` in its place'
+                    f"{first}the times of '{name}' do not grow from row to row; if rows are out of order, sort them by "
+                    'time, else give a column of time that grows and has enough digits, or `rate_hz` in its place'
                 )
         elif not (measured or params.rate_hz):
             raise InvalidData(f"'{name}' has no column of time and no rate; write time: {{column: NAME}}, or `rate_hz`")
@@ -573,17 +589,17 @@ class FrameSlides:
         if measured and not 1 / SAME_RATE <= measured / rate_hz <= SAME_RATE:
             by, where = ('itself', '') if stream.time_s is None else ('its times', f"the unit of '{stream.clock}' and ")
             raise InvalidData(
-                f"'{name}' has {measured:g} Hz by {by}, {rate_hz:g} Hz are expected; look at {where}`rate_hz` in the "
-                'mapping, and give each rate another one'
+                f"{first}'{name}' has {measured:g} Hz by {by}, {rate_hz:g} Hz are expected; look at {where}`rate_hz` "
+                'in the mapping, and give each rate another one'
             )
         low, high = PLAUSIBLE_HZ
         if not low <= rate_hz <= high:
             by = 'the mapping' if params.rate_hz else 'its times'
-            units = () if params.rate_hz else _units(params, rate_hz)
+            units = () if params.rate_hz or side or len(stream.rows) <= FEW_ROWS else _units(params, rate_hz)
             likely = [f'; with unit: {one} it would be {rate_hz / factor:g} Hz' for one, factor in units]
             raise InvalidData(
-                f"the rate of '{name}' is {rate_hz:g} Hz by {by}{''.join(likely[:1])}; give a column of time that "
-                f'grows and its unit, or `rate_hz`, from {low:g} to {high:g}'
+                f"{first}the rate of '{name}' is {rate_hz:g} Hz by {by}{''.join(likely[:1])}; give a column of time "
+                f'that grows and its unit, or `rate_hz`, from {low:g} to {high:g}'
             )
         self._report.rates_hz[name] = rate_hz
         return replace(stream, rate_hz=rate_hz / per_row)

@@ -25,6 +25,7 @@ from texture_recordings.readers import MAPPED
 from texture_recordings.tables import import_tables
 
 FAST_TOPIC = 'signal'
+NO_SLIDE = 'lower --on and --off, or --ramp-s, or give the noise at rest as --noise-rms'
 USAGE = 'texture import DATA_SET SOURCE OUT, or texture import {table,bag} MAPPING SOURCE OUT'
 
 
@@ -74,14 +75,20 @@ def segment_bags(
 ) -> dict[Path, int]:
     """Copy bags, their exploration states replaced by those found in the signals; return the slides in each copy.
 
-    All other messages are copied as they are. InvalidData if a bag has slides already.
+    All other messages are copied as they are. InvalidData if a bag has slides already, or none has one that is found.
     """
     paths = find_bags(bags)
     with new_folder(out):
-        return {
+        found = {
             out / path.name: _with_slides(path, out / path.name, params, surface, namespace)
             for path in progress(paths, 'segmenting bags', len(paths))
         }
+        if not any(found.values()):
+            raise InvalidData(
+                f'no slide was found at a power of {params.on:g} times that of rest, longer than two ramps of '
+                f'{params.ramp_s:g} s; {NO_SLIDE}'
+            )
+        return found
 
 
 def _with_slides(path: Path, out: Path, params: SegmentationParams, surface: str, namespace: str | None) -> int:
@@ -122,7 +129,7 @@ def _segment(options: argparse.Namespace) -> int:
     params = parameters_from(options, SegmentationParams)
     found = segment_bags(options.bags, Path(options.out), params, options.surface, options.namespace)
     for path, slides in found.items():
-        print(f'{path}: {counted(slides, "slide")}')
+        print(f'{path}: {counted(slides, "slide")}' + f'; {NO_SLIDE}, or leave it out' * (not slides))
     return 0
 
 

@@ -27,7 +27,15 @@ def _configure_record(parser: argparse.ArgumentParser) -> None:
 
 def _record(options: argparse.Namespace) -> int:
     parameters = {'out': options.out, 'all': options.all, 'signal_topics': options.signal_topics}
-    run_node(RecordNode, parameters, options.namespace)
+    nodes: list[RecordNode] = []
+
+    def make() -> RecordNode:
+        nodes.append(RecordNode())
+        return nodes[0]
+
+    run_node(make, parameters, options.namespace)
+    if error := nodes[0].error:  # found at its end
+        raise error
     return 0
 
 

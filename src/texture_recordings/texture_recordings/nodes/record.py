@@ -28,6 +28,7 @@ QUEUE = 20_000  # a minute of one finger: a disk that stalls longer loses messag
 POLL_S = 0.2
 FLUSH_S = 1.0  # what a killed recorder, a failing supply or a full disk may take
 DISCOVERY_S = 0.5  # period of the search for other topics
+SILENT_S = 5.0  # without a sample, after which it is reported
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,8 @@ class RecordNode(Node):
         self._continuity = Continuity()
         self._exploring: dict[str, str] = {}  # id of the exploration that is recorded, '' if none, by topic
         self._queue: queue.Queue[RawMessage | None] = queue.Queue(QUEUE)
-        self.error: TextureError | None = None  # which ended the recording
+        self.error: TextureError | None = None  # which ended the recording, or says that it has no sample
+        self._silent_from_s = time.monotonic() + SILENT_S
         self._writer = threading.Thread(target=self._write, name='writer')
         self._writer.start()
         self._namespace = self.get_namespace().rstrip('/')
@@ -87,8 +89,11 @@ class RecordNode(Node):
         if self.error is not None:
             self.get_logger().error(f'the bag is not complete: {self.error}')
         else:
+            self._silent_from_s = 0.0
             self.get_logger().info(f"'{self._path}' is complete: {self._report()[1]}")
             self._diagnostics.end()
+            if silence := self._silence():
+                self.error = InvalidData(f"'{self._path}': {silence}")
 
     def _find_more(self) -> None:
         """Subscribe to what has appeared."""
@@ -136,6 +141,7 @@ class RecordNode(Node):
                         return
                     self._bag.write_raw(message)
                     self._counts['messages'] += 1
+                    self._counts['wanted'] += self._all and message.topic not in COMMON
                     self._note(message)
                 if time.monotonic() - flushed_s >= FLUSH_S:
                     flushed_s = time.monotonic()
@@ -154,6 +160,7 @@ class RecordNode(Node):
             return
         if isinstance(value, TactileSignal):
             self._continuity.update(message.topic, value)
+            self._counts['wanted'] += 1
             return
         before = self._exploring.get(message.topic, '')
         self._exploring[message.topic] = '' if value.phase in ENDED else value.exploration_id
@@ -166,6 +173,17 @@ class RecordNode(Node):
         if self.error is not None:
             rclpy.try_shutdown()
 
+    def _silence(self) -> str:
+        """Return that no sample came, and where sensors publish; '' at first."""
+        if self._counts['wanted'] or time.monotonic() < self._silent_from_s:
+            return ''
+        found = [name for name, types in self.get_topic_names_and_types() if 'texture_msgs/msg/TactileSignal' in types]
+        sensors = ', '.join(name for name in found if self.count_publishers(name))
+        return (
+            f"no sample came in the namespace '{self._namespace or '/'}', and sensors publish {sensors or 'nowhere'}; "
+            'start the sensor, or give its namespace (--namespace)'
+        )
+
     def _report(self) -> DiagnosticReport:
         lost = sum(self._continuity.lost.values())
         dropped, bad = self._counts['dropped'], self._counts['bad']
@@ -177,7 +195,9 @@ class RecordNode(Node):
             **{f'samples {topic}': count for topic, count in self._continuity.samples.items()},
         }
         others = [f'{count} {name.replace("_", " ")}' for name, count in faults.items() if count]
-        said = ', '.join(filter(None, (self._continuity.losses, *others[bool(lost) :])))
+        if silence := self._silence():
+            self.get_logger().warning(silence, once=True)
+        said = ', '.join(filter(None, (self._continuity.losses, *others[bool(lost) :], silence)))
         sentence = f'{self._counts["messages"]} messages recorded, {said or "nothing lost"}'
         return 'WARN' if said else 'OK', sentence, numbers
 
