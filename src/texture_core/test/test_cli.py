@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from texture_core import cli
-from texture_core.cli import Parser, add_namespace, core_count
+from texture_core.cli import Parser, add_namespace, add_slides, core_count
 from texture_core.errors import TextureError
 
 
@@ -56,6 +56,7 @@ def test_a_stop_while_a_node_imports_ends_it_with_0_and_without_a_traceback(numb
         (['oak', '--speed', 'fast'], "--speed is 'fast'; a number is needed: speed, 5 % at least"),
         (['oak', '--jobs', '0'], "--jobs is '0'; 0 cores compute nothing; 1 or more are needed, or -1 for all"),
         (['oak', '--kind', 'liner'], "no value of --kind 'liner'; did you mean 'linear'? Known: circular, linear"),
+        (['oak', '--slides', ''], "--slides is ''; write N-M, or leave it out for all"),
         (['oak', '--speed'], '--speed expected one argument; write --speed M/S'),
         (['oak', '--namespace', 'le ft'], "the namespace is 'le ft'; allowed are letters, digits and _"),
         (['oak', 'elm'], "'elm' is one argument too many; write touch [-h] [--speed M/S]"),
@@ -69,6 +70,7 @@ def test_a_mistake_in_an_option_is_answered_with_what_came_and_what_is_allowed(g
     parser.add_argument('--speed', type=float, metavar='M/S', help='speed, 5 %% at least')
     parser.add_argument('--jobs', type=core_count)
     add_namespace(parser)
+    add_slides(parser)
     parser.add_argument('--kind', choices=('linear', 'circular'))
     with pytest.raises(TextureError) as refused:
         parser.parse_args(given)

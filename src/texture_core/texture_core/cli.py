@@ -100,10 +100,20 @@ def add_bag_namespace(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--namespace', default=None, type=ros_namespace, metavar='NS', help=about)
 
 
+class _NotEmpty(argparse.Action):
+    """Take a text that is given, and refuse an empty one, as of a variable of the shell that is not set."""
+
+    def __call__(self, parser: object, namespace: object, values: Any, option_string: str | None = None) -> None:
+        if not values.strip():
+            raise InvalidParameter(f"{option_string} is '{values}'; write {self.metavar}, or leave it out for all")
+        setattr(namespace, self.dest, values)
+
+
 def add_slides(parser: argparse.ArgumentParser) -> None:
     """Add `--slides`."""
     parser.add_argument(
         '--slides',
+        action=_NotEmpty,
         default='',
         metavar='N-M',
         help='which slides of each surface, counted as recorded, such as 1-30 or 1,3,5-7; all if not given',
