@@ -286,7 +286,8 @@ def write_commands(env: dict[str, str]) -> None:
     ]
     head = '#!/usr/bin/env bash\n# Written by tools/workspace.py.\n' + '\n'.join(exports) + '\n'
     # The current folder is not searched: it may be somebody else's.
-    texture = f'exec env PYTHONSAFEPATH=1 {PYTHON} -m texture_bringup.command "$@"\n'
+    # Ctrl-C waits until the command handles it: in the imports of Python's start it would show a traceback.
+    texture = f'exec env --block-signal=INT PYTHONSAFEPATH=1 {PYTHON} -m texture_bringup.command "$@"\n'
     for name, tail in {'ros-run': 'exec "$@"\n', 'texture': texture}.items():
         command = VENV / 'bin' / name
         command.write_text(head + tail)

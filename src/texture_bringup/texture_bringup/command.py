@@ -14,6 +14,7 @@ import signal
 
 if __name__ == '__main__':  # Ctrl-C during the imports below ends it without a traceback
     signal.signal(signal.SIGINT, lambda *_: os._exit(130))
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})  # the shell script `texture` blocks it until here
 
 import argparse
 import ast

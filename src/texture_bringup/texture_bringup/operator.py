@@ -260,7 +260,7 @@ class Operator:
         except KeyboardInterrupt:
             raise KeyboardInterrupt('nothing was requested') from None
         except LaunchFailed as error:
-            others = ', '.join(sorted(space for space in self._explorers() if space != ours))
+            others = ', '.join(sorted({*self._explorers()} - {ours}))
             if not others:
                 raise
             raise LaunchFailed(

@@ -198,6 +198,7 @@ def test_answers_of_one_cluster_count_together() -> None:
         (LeaveOneGroupOut(), 'force', 'the slides cannot be split'),
         (LeaveOneGroupOut(), 'session', r'all are of one session, .*; import or record slides of a second session, '),
         ('stratified:3', 'slide', r"the splitter is 'stratified:3'; give one of scikit-learn"),
+        (StratifiedKFold, 'slide', r'the splitter is <class .*StratifiedKFold.*>; give one of scikit-learn'),
         (LeaveOneGroupOut(), np.zeros(3), 'groups have the shape'),
         (
             LeaveOneGroupOut(),

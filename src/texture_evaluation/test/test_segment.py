@@ -61,6 +61,22 @@ def test_a_bag_with_labelled_slides_is_refused_and_keeps_them(bag, tmp_path):
     assert not (tmp_path / 'found').exists()
 
 
+def test_slides_without_a_label_get_one_and_keep_all_else(bag, tmp_path):
+    with BagWriter(tmp_path / 'unnamed') as writer:
+        for topic, log_ns, value in read_bag(bag, ('signal', 'exploration')):
+            writer.write(topic, replace(value, surface='') if topic == 'exploration' else value, log_ns)
+    [(path, count)] = segment_bags(tmp_path / 'unnamed', tmp_path / 'found', SegmentationParams(), 'oak').items()
+    kept = slides_of(bag)
+    assert count == len(kept)
+    assert list(map(str, slides_of(path))) == [str(replace(slide, surface='oak')) for slide in kept]  # NaN is not NaN
+    assert [slide.name for slide in find_slides([path])] == ['oak/1', 'oak/2', 'oak/3']
+
+
+def test_a_label_of_found_slides_is_not_empty(bag, tmp_path):
+    with pytest.raises(InvalidData, match='no surface was named; give its label'):
+        segment_bags([bag], tmp_path / 'found', SegmentationParams(), ' ')
+
+
 def test_bags_without_a_slide_are_refused_and_one_of_several_is_named(bag, tmp_path, capsys):
     bare, quiet = without_states(bag, tmp_path / 'bare'), tmp_path / 'quiet'
     with BagWriter(quiet) as writer:

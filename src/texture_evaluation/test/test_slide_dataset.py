@@ -144,6 +144,7 @@ def test_arrays_that_contradict_each_other_are_refused(arguments: tuple, sentenc
 @pytest.mark.parametrize(
     ('conditions', 'sentence'),
     [
+        ({'speed_m_s': 'fast'}, "speed_m_s is 'fast'; give one number, or one for each slide"),
         ({'speed_m_s': [*SPEEDS[:5], 50.0]}, 'the speed of a slide is 50 m/s, plausible are .* may be cm/s or mm/s'),
         ({'force_n': math.inf}, 'the force of a slide is inf N, plausible are 1 mN to 100 N'),
         ({'direction_rad': 90}, 'the direction of a slide is 90 rad, .* its unit, which may be deg'),
@@ -206,6 +207,13 @@ def test_slides_without_a_whole_window_are_refused_with_a_sentence(tmp_path: Pat
     bags = write_simulated(tmp_path, SlidePlan(slides=1, slide_s=0.3), np.random.default_rng(0), surfaces=('glass',))
     with pytest.raises(InvalidData, match='none of the 1 slides has a whole window'):
         SlideDataset.from_bags(bags).features(BAG_FEATURES)
+    samples = np.where(np.arange(4000)[:, None] % 4, 0.5, np.nan)
+    with pytest.raises(
+        InvalidData, match=r'none of the 1 slides has .* \(25 % of the samples have NaN or infinity\); record'
+    ):
+        SlideDataset.from_arrays({'signal': [samples]}, ['oak'], {'signal': 1000.0}).features(
+            FeatureSet.load('default')
+        )
 
 
 def test_a_joined_recipe_is_trained_from_bags_of_two_fingers(tmp_path: Path) -> None:

@@ -538,7 +538,7 @@ def split_slides(
     Where parts of one slide would be in training and test, a split becomes two, each trained on every other slide of
     a surface and tests on those between.
     """
-    if not hasattr(splitter, 'split') or isinstance(splitter, str):
+    if not hasattr(splitter, 'split') or isinstance(splitter, (str, type)):
         raise InvalidData(f'the splitter is {splitter!r}; give one of scikit-learn, such as StratifiedKFold(5)')
     columns, labels = slide_groups(dataset, groups), dataset.labels
     if type(splitter).__name__.startswith('Stratified'):

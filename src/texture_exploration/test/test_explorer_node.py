@@ -4,6 +4,7 @@
 
 import gc
 import math
+import re
 import signal
 import time
 from contextlib import closing
@@ -137,9 +138,15 @@ def test_a_request_that_two_explorers_would_take_is_refused_until_one_has_ended(
     refused, several = world.explored(**QUICK), 'several explorers are in the ROS_DOMAIN_ID 68 and namespace /;'
     assert (refused.error_code, refused.exploration_id) == (Result.ERROR_NOT_ACTIVE, '')
     assert refused.message.startswith(several)
-    touch = world.result(world.peer.create_client(Trigger, 'explorer/touch_surface').call_async(Trigger.Request()))
-    assert not touch.success
-    assert touch.message.startswith(several)
+    for service, sentence in (
+        ('touch_surface', several),
+        ('recover', several),
+        ('lift', f'.*nothing touches it, of one arm; look at the others: {several}'),
+        ('stop', f'.*, of one arm; look at the others: {several}'),
+    ):
+        answer = world.result(world.peer.create_client(Trigger, f'explorer/{service}').call_async(Trigger.Request()))
+        assert not answer.success
+        assert re.match(sentence, answer.message)
     world.until(lambda: world.diagnostics and world.diagnostics[-1].status[0].message.startswith(several))
     twin.shutdown()
     twin.destroy_node()

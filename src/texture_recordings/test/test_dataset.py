@@ -92,7 +92,7 @@ def test_a_slide_yields_its_messages_only(tmp_path: Path) -> None:
 
 def test_unlabelled_slides_are_left_out_and_a_bag_without_labels_is_refused(tmp_path: Path) -> None:
     assert len(find_slides([write(tmp_path / 'some', ['', 'cork'], start_s=0)])) == 1
-    with pytest.raises(InvalidData, match='is labelled'):
+    with pytest.raises(InvalidData, match='is labelled; label them by `texture segment --surface NAME`'):
         find_slides([write(tmp_path / 'none', ['', ''], start_s=0)])
 
 
@@ -102,11 +102,14 @@ def test_an_empty_bag_among_others_is_named_and_skipped(tmp_path: Path, caplog: 
         pass
     assert [slide.bag.name for slide in find_slides([tmp_path])] == ['cork']
     assert f"the bag '{tmp_path / 'cork-2'}' has no labelled slide" in caplog.text
-    with pytest.raises(InvalidData, match='is labelled'):
-        find_slides([tmp_path / 'cork-2'])
+    with BagWriter(tmp_path / 'idle') as idle:
+        idle.write('exploration', ExplorationState(1, '', '', Phase.IDLE), 1)
+    for name in ('cork-2', 'idle'):
+        with pytest.raises(InvalidData, match=r'nothing was explored in .* or have `texture segment` find its slides'):
+            find_slides([tmp_path / name])
 
 
-@pytest.mark.parametrize('surfaces', [[], ['cork', 'felt']])
+@pytest.mark.parametrize('surfaces', [['cork'], ['cork', 'felt']])
 def test_bags_of_explorations_that_were_refused_or_aborted_before_their_slide_are_named_so(
     tmp_path: Path, surfaces: list[str]
 ) -> None:
@@ -114,7 +117,7 @@ def test_bags_of_explorations_that_were_refused_or_aborted_before_their_slide_ar
     with BagWriter(bag.with_name('idle')) as idle:
         idle.write('exploration', ExplorationState(1, '', '', Phase.IDLE), 1)
     with pytest.raises(InvalidData, match=r"came to its slide: .* ends with 'the motion was completed'"):
-        find_slides([bag.with_name('idle'), *([bag] if surfaces else [])])
+        find_slides([bag.with_name('idle'), bag])
 
 
 def test_slides_that_no_surface_has_are_refused(tmp_path: Path) -> None:

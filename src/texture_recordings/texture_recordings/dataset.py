@@ -179,7 +179,10 @@ class SlideDataset:
             raise InvalidData("no signal was given; give arrays by topic, such as {'signal': [...]}")
         numbers: dict[str, Array] = {}
         for (name, column), values in zip(CONDITION_COLUMNS.items(), (speed_m_s, force_n, direction_rad), strict=True):
-            array = np.asarray(values, dtype=np.float64)
+            try:
+                array = np.asarray(values, dtype=np.float64)
+            except (TypeError, ValueError) as error:
+                raise InvalidData(f'{column} is {values!r:.40}; give one number, or one for each slide') from error
             if array.shape not in ((), (count,)):
                 raise InvalidData(
                     f'{column} has the shape {array.shape}; give one number, or one for each of {count} slides'
@@ -573,8 +576,11 @@ def _described(slide: LabelledSlide, feature_set: FeatureSet, events: Sequence[W
 
 def no_window(dataset: SlideDataset, feature_set: FeatureSet) -> InvalidData:
     """Return the error for slides of which not one has a usable window."""
+    signals = [batch for slide in dataset for topic in feature_set.topics for batch in slide.signals.get(topic, ())]
+    bad = np.concatenate([[False], *(~np.isfinite(batch.samples).all(axis=1) for batch in signals)])
+    lost = f' ({100.0 * bad.mean():.0f} % of the samples have NaN or infinity)' if bad.any() else ''
     return InvalidData(
-        f'none of the {len(dataset)} slides has a whole window of {feature_set.windows.length_s} s; '
+        f'none of the {len(dataset)} slides has a whole window of {feature_set.windows.length_s} s{lost}; '
         'record longer slides without losses, or use a recipe with shorter windows'
     )
 

@@ -264,13 +264,20 @@ def find_slides(
         labelled += slides_of_bag
     if not labelled:
         states = [state for path in paths for _, _, state in read_bag(path, (EXPLORATION,), namespace)]
-        if states and not any(state.phase is Phase.SLIDE for state in states):
+        phases = {state.phase for state in states if state.exploration_id}
+        if not phases:
+            raise InvalidData(
+                f'nothing was explored in {_named(paths)}; explore while it is recorded, or have `texture segment` '
+                'find its slides'
+            )
+        if Phase.SLIDE not in phases:
             raise InvalidData(
                 f'no exploration in {_named(paths)} came to its slide: each was refused or aborted before; record '
                 "again, and keep what ends with 'the motion was completed'"
             )
         raise InvalidData(
-            f"no slide in {_named(paths)} is labelled; give the surface's name with each exploration you record"
+            f'no slide in {_named(paths)} is labelled; label them by `texture segment --surface NAME`, and give the '
+            'surface with each exploration that you record'
         )
     numbered = with_places(number_slides(labelled))
     if faulty := [slide for slide in numbered if slide.was_faulty]:

@@ -392,14 +392,21 @@ class ExplorerNode(PatientLifecycleNode):
         self._last_error = ExplorationError.STOPPED  # also for those who are between two explorations
         self._publish_info()
         time.sleep(STOP_COVERS_S)  # what is requested after the answer is not covered
-        return message
+        return self._of_one_arm(message)
 
     def _recover(self) -> str:
+        self._check_alone()
         self._explorer.recover()
         return 'the arm can move'
 
     def _lift(self) -> str:
-        return f'the finger rose by {1e3 * self._explorer.lift():.1f} mm, and nothing touches it'
+        return self._of_one_arm(f'the finger rose by {1e3 * self._explorer.lift():.1f} mm, and nothing touches it')
+
+    def _of_one_arm(self, message: str) -> str:
+        """Return what this arm did; MotionRefused, with it, if another one may not have had the request."""
+        if several := self._several():
+            raise MotionRefused(f'{message}, of one arm; look at the others: {several}', ExplorationError.NOT_ACTIVE)
+        return message
 
     def _touch_surface(self) -> str:
         self._check_alone()

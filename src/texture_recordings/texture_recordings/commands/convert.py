@@ -14,7 +14,7 @@ from typing import Any
 from texture_core.cli import Command, add_bag_namespace, add_parameters, add_slides, parameters_from, progress, task
 from texture_core.config import find
 from texture_core.errors import InvalidData, InvalidParameter, counted
-from texture_core.types import Phase, TactileSignal
+from texture_core.types import ExplorationState, Phase, TactileSignal, checked_label
 from texture_features.segmentation import SegmentationParams, segment_recording
 from texture_recordings.bags import EXPLORATION, BagPaths, BagWriter, find_bags, new_folder, read_bag, read_named
 from texture_recordings.dataset import SlideDataset
@@ -73,10 +73,12 @@ def _import_mapped(options: argparse.Namespace) -> list[Path]:
 def segment_bags(
     bags: BagPaths, out: Path, params: SegmentationParams, surface: str, namespace: str | None = None
 ) -> dict[Path, int]:
-    """Copy bags, their exploration states replaced by those found in the signals; return the slides in each copy.
+    """Copy bags with the slides found in their signals, or with a label for those that have none; return their numbers.
 
-    All other messages are copied as they are. InvalidData if a bag has slides already, or none has one that is found.
+    All other messages are copied as they are. InvalidData if a bag has labelled slides, or no bag has a slide.
     """
+    if not checked_label(surface):
+        raise InvalidData('no surface was named; give its label (--surface)')
     paths = find_bags(bags)
     with new_folder(out):
         found = {
@@ -92,18 +94,23 @@ def segment_bags(
 
 
 def _with_slides(path: Path, out: Path, params: SegmentationParams, surface: str, namespace: str | None) -> int:
-    signals: list[TactileSignal] = []
+    signals, explored = list[TactileSignal](), list[ExplorationState]()
     for topic, _, value in read_bag(path, (FAST_TOPIC, EXPLORATION), namespace):
         if topic == FAST_TOPIC:
             signals.append(value)
-        elif value.phase is Phase.SLIDE:
+        elif value.phase is Phase.SLIDE and value.surface:
             raise InvalidData(
                 f"the bag '{path}' has slides already, the first over '{value.surface}'; use it as it is, and give "
-                'only bags without exploration states here'
+                'only bags without labelled slides here'
             )
+        else:
+            explored.append(value)
     if not signals:
         raise InvalidData(f"the bag '{path}' has no '{FAST_TOPIC}' to find slides in; also record the vibration")
-    states = segment_recording(signals, params, exploration_id=path.name)
+    if any(state.phase is Phase.SLIDE for state in explored):
+        states = [state for state in explored if state.exploration_id]
+    else:
+        states = segment_recording(signals, params, exploration_id=path.name)
     with BagWriter(out) as bag:
         prefix = ''
         for name, message in read_named(path, namespace):
@@ -113,7 +120,7 @@ def _with_slides(path: Path, out: Path, params: SegmentationParams, surface: str
                 prefix = message.topic.removesuffix(f'/{name}')
         for state in states:
             bag.write(f'{prefix}/{EXPLORATION}', replace(state, surface=surface), state.stamp_ns)
-    return sum(state.phase is Phase.SLIDE for state in states)
+    return len({state.exploration_id for state in states if state.phase is Phase.SLIDE})
 
 
 def _configure_segment(parser: argparse.ArgumentParser) -> None:
@@ -151,4 +158,6 @@ def _export(options: argparse.Namespace) -> int:
 
 export = Command('write labelled slides as Parquet, a row for each sample', _configure_export, _export)
 import_ = Command('convert third-party recordings into labelled bags', _configure_import, _import)
-segment = Command('find the slides in bags without exploration states', _configure_segment, _segment)
+segment = Command(
+    'find slides in bags without explorations, or label those without a surface', _configure_segment, _segment
+)
