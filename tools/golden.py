@@ -26,6 +26,7 @@ import os
 import struct
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatch
@@ -388,6 +389,9 @@ class Recording:
             assert exploration.ended.wait(PATIENCE_S)
         finally:
             explorer.close()
+        count = -1
+        while count < (count := len(self.sent)):  # a busy device executes the last ones later
+            time.sleep(0.2)
         return {
             'outcome': [exploration.outcome.success, exploration.outcome.message],
             'phases': [phase for phase, _ in self.phases],
