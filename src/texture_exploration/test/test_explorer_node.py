@@ -55,6 +55,7 @@ class World:
 
     def __init__(self, graph, **parameters):
         values = {'start_height_m': 0.002, 'state_timeout_s': 1.0, 'watch_signal': False, **parameters}
+        self.graph = graph
         self.explorer, self.peer, self.until = graph.add(ExplorerNode, **values), graph.peer, graph.until
         self.states = graph.listen(msg.ExplorationState, 'exploration', STATE_QOS)
         self.diagnostics = graph.listen(DiagnosticArray, '/diagnostics')
@@ -130,26 +131,28 @@ def test_a_service_call_explores_and_reports(make_world):
     world.until(lambda: phase_of(world.states[-1]) == 'idle')
 
 
-def test_a_request_that_two_explorers_would_take_is_refused_until_one_has_ended(make_world, graph, monkeypatch):
+def test_a_request_that_two_explorers_would_take_is_refused_until_one_has_ended(make_world, monkeypatch):
     monkeypatch.setattr(SimulatedArm, 'base_frame_id', 'base')
     monkeypatch.setattr(SimulatedArm, 'surface_pose', (0.0,) * 6)
-    world, twin = make_world(), graph.add(ExplorerNode, watch_signal=False)
-    world.until(lambda: world.peer.count_services('explore') == 2)
-    refused, several = world.explored(**QUICK), 'several explorers are in the ROS_DOMAIN_ID 68 and namespace /;'
-    assert (refused.error_code, refused.exploration_id) == (Result.ERROR_NOT_ACTIVE, '')
-    assert refused.message.startswith(several)
-    for service, sentence in (
-        ('touch_surface', several),
-        ('recover', several),
-        ('lift', f'.*nothing touches it, of one arm; look at the others: {several}'),
-        ('stop', f'.*, of one arm; look at the others: {several}'),
-    ):
-        answer = world.result(world.peer.create_client(Trigger, f'explorer/{service}').call_async(Trigger.Request()))
-        assert not answer.success
-        assert re.match(sentence, answer.message)
-    world.until(lambda: world.diagnostics and world.diagnostics[-1].status[0].message.startswith(several))
-    twin.shutdown()
-    twin.destroy_node()
+    world, several = make_world(), 'several explorers are in the ROS_DOMAIN_ID 68 and namespace /;'
+    infos = world.graph.listen(msg.ExplorerInfo, 'explorer_info')
+    with NodeProcess('texture_exploration', 'explorer', {'watch_signal': False}):
+        world.until(lambda: sum(info.message.startswith(several) for info in infos) == 2)  # both know it
+        refused = world.explored(**QUICK)
+        assert (refused.error_code, refused.exploration_id) == (Result.ERROR_NOT_ACTIVE, '')
+        assert refused.message.startswith(several)
+        for service, sentence in (
+            ('touch_surface', several),
+            ('recover', several),
+            ('lift', f'.*nothing touches it, of one arm; look at the others: {several}'),
+            ('stop', f'.*, of one arm; look at the others: {several}'),
+        ):
+            client = world.peer.create_client(Trigger, f'explorer/{service}')
+            world.until(client.service_is_ready)
+            answer = world.result(client.call_async(Trigger.Request()))
+            assert not answer.success
+            assert re.match(sentence, answer.message)
+        world.until(lambda: world.diagnostics and world.diagnostics[-1].status[0].message.startswith(several))
     world.until(lambda: world.peer.count_services('explore') == 1)
     assert world.explored(**QUICK).error_code == OK
 
