@@ -29,6 +29,7 @@ BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
 def run_benchmark(name: str, options: BenchmarkOptions) -> tuple[BenchmarkResult, Path]:
     """Run one study; return its result and the JSON file, with the charts next to it."""
     run = find(BENCHMARKS, name, 'benchmark')
+    options.out.mkdir(parents=True, exist_ok=True)  # not only when the figures are there
     with reduced_run(quick=options.quick):
         result = run(options)
         return result, result.write(options.out, name, run.__doc__)

@@ -86,6 +86,13 @@ def checked_label(label: str) -> str:
     return label
 
 
+def needed_label(label: str) -> str:
+    """Return a label as `checked_label` does; InvalidData if it is empty."""
+    if label := checked_label(label):
+        return label
+    raise InvalidData('no surface was named; give its label')
+
+
 def _shown(label: str) -> str:
     """Return the beginning of a label, safe to print."""
     start = label[:SHOWN_CHARACTERS].encode('unicode_escape').decode()

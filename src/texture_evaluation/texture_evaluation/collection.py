@@ -26,7 +26,7 @@ from texture_core.errors import (
     TextureError,
     counted,
 )
-from texture_core.types import Array, ExplorationRequest, checked_label
+from texture_core.types import Array, ExplorationRequest, needed_label
 from texture_estimation.acceptance import LEAST_SLIDES_A_LABEL
 from texture_estimation.domain import Domain
 from texture_estimation.learners.discriminant import Discriminant
@@ -100,13 +100,6 @@ class Patch:
     y_high_m: float
 
 
-def named(surface: str) -> str:
-    """Return the label of a surface; InvalidData if it is none."""
-    if label := checked_label(surface):
-        return label
-    raise InvalidData('no surface was named; give its label')
-
-
 UNLIMITED = (0.0, math.inf)
 # By the names of the lowest and the highest: default of the lowest, ratio of the default highest to it, and the unit.
 USUAL = {('force_low_n', 'force_high_n'): (1.0, 2.0, 'N'), ('speed_low_m_s', 'speed_high_m_s'): (0.02, 2.5, 'm/s')}
@@ -143,7 +136,7 @@ class PlacePlan:
         allowed_forces_n: tuple[float, float] = UNLIMITED,
         allowed_speeds_m_s: tuple[float, float] = UNLIMITED,
     ) -> None:
-        self._surface, self._params, self._patch = named(surface), params, patch
+        self._surface, self._params, self._patch = needed_label(surface), params, patch
         forces, speeds = USUAL
         self._forces_n = fitted_range(params, forces, allowed_forces_n)
         self._speeds_m_s = fitted_range(params, speeds, allowed_speeds_m_s)

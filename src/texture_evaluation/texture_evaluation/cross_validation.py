@@ -155,9 +155,8 @@ def interval(counts: Array, clusters: Sequence[str] | AnyArray | None = None) ->
     counts = counts[counts[:, 1] > 0]
     right, answers = counts.sum(axis=0)
     accuracy = float(right / answers)
-    bound = float(
-        (1.0 - CONFIDENCE) ** (1.0 / len(counts))
-    )  # lower bound of the fraction of clusters like those tested
+    # Lower bound of the fraction of clusters like those tested
+    bound = float((1.0 - CONFIDENCE) ** (1.0 / len(counts)))
     low, high = _edges(_resampled(counts))
     return [min(low, accuracy * bound), max(high, 1.0 - (1.0 - accuracy) * bound)]
 

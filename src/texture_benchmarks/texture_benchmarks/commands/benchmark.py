@@ -12,7 +12,6 @@ from pathlib import Path
 from texture_benchmarks.catalogue import BENCHMARKS, run_benchmark
 from texture_benchmarks.study import BenchmarkOptions
 from texture_core.cli import add_seed, task
-from texture_core.config import find
 from texture_evaluation.charts import REDUCED
 
 
@@ -33,8 +32,6 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run one benchmark."""
-    find(BENCHMARKS, options.name, 'benchmark')  # before a folder is made
-    options.out.mkdir(parents=True, exist_ok=True)  # not only when the figures are there
     benchmark_options = BenchmarkOptions(options.out, options.data, options.seed, options.quick)
     began_s = time.monotonic()
     with task(options.name):

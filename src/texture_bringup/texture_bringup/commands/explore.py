@@ -41,7 +41,7 @@ from texture_core.errors import (
     TextureError,
     counted,
 )
-from texture_core.types import ExplorationRequest, ExplorationState, Rejection, TextureEstimate
+from texture_core.types import ExplorationRequest, ExplorationState, Rejection, TextureEstimate, needed_label
 from texture_exploration.motions import MOTIONS
 from texture_exploration.presets import load_preset
 from texture_exploration.safety import RANGES
@@ -520,9 +520,9 @@ def claimed(folder: Path) -> Iterator[None]:
 
 def _collect(options: argparse.Namespace) -> int:
     """Collect, and report how well left-out places are recognised; return 0 if the bound is met, else 1."""
-    from texture_evaluation.collection import CollectionParams, named, next_bag
+    from texture_evaluation.collection import CollectionParams, next_bag
 
-    named(options.surface)  # refused before the wait for an explorer
+    needed_label(options.surface)  # refused before the wait for an explorer
     given = dict(zip(SHORTER, (options.distance, *options.speed, *options.force), strict=True))
     params, folder = parameters_from(options, CollectionParams, given), options.folder
     try:

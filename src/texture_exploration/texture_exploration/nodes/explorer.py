@@ -496,17 +496,17 @@ class ExplorerNode(PatientLifecycleNode):
         return replace(state, stamp_ns=stamp_ns, frame_id=self._surface_frame_id)
 
     def _report(self) -> DiagnosticReport:
-        current, fault = self._explorer.current, self._explorer.fault() or self._several()
+        current, arm_fault = self._explorer.current, self._explorer.fault()
         numbers = {
             'phase': current.state.phase.value if current else Phase.IDLE.value,
             'exploration': current.exploration_id if current else '',
             'last_end': self._last_end,
-            'arm_fault': fault or 'none',
+            'arm_fault': arm_fault or 'none',
             **self._explorer.counts,
         }
         if not self._active:
             return 'WARN', self._why_not_ready(), numbers
-        if fault:
+        if fault := arm_fault or self._several():
             return 'ERROR', fault, numbers
         warning = self._explorer.arm.warning() or ('' if current else self._not_lifted)
         return ('WARN', warning, numbers) if warning else ('OK', 'the arm answers', numbers)

@@ -14,7 +14,7 @@ from typing import Any
 from texture_core.cli import Command, add_bag_namespace, add_parameters, add_slides, parameters_from, progress, task
 from texture_core.config import find
 from texture_core.errors import InvalidData, InvalidParameter, counted
-from texture_core.types import ExplorationState, Phase, TactileSignal, checked_label
+from texture_core.types import ExplorationState, Phase, TactileSignal, needed_label
 from texture_features.segmentation import SegmentationParams, segment_recording
 from texture_recordings.bags import EXPLORATION, BagPaths, BagWriter, find_bags, new_folder, read_bag, read_named
 from texture_recordings.dataset import SlideDataset
@@ -77,9 +77,7 @@ def segment_bags(
 
     All other messages are copied as they are. InvalidData if a bag has labelled slides, or no bag has a slide.
     """
-    if not checked_label(surface):
-        raise InvalidData('no surface was named; give its label (--surface)')
-    paths = find_bags(bags)
+    surface, paths = needed_label(surface), find_bags(bags)
     with new_folder(out):
         found = {
             out / path.name: _with_slides(path, out / path.name, params, surface, namespace)
